@@ -1,0 +1,6 @@
+"""Statistics of judging: from images and an expectation to evidence and a verdict."""
+
+from oracle.statistics.evidence import Evidence, Interval, Place, Verdict
+from oracle.statistics.judge import MIN_IMAGES, judge
+
+__all__ = ["MIN_IMAGES", "Evidence", "Interval", "Place", "Verdict", "judge"]
