@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
+from scipy import stats
 
 from oracle.arrays import Floats
 
 _SIDES = (2, 8, 32)
-# One-sided; at 5 standard deviations the normal tail is 3e-7 for each of the four scales.
-_LIMIT = 5.0
+# A false doubt costs samples, not points; it may come once in a million images.
+_LEVEL = 1e-6
 
 
-def correlation(images: Floats) -> float:
-    """How far pixels' noise is from independent: the largest standard score over blocks of several sizes.
+def p_value(images: Floats) -> float:
+    """Probability of noise that is at least so much alike between pixels, if their noise is independent.
 
     Parameters
     ----------
@@ -22,32 +22,35 @@ def correlation(images: Floats) -> float:
     Returns
     -------
     float
-        Standard score of the excess of the block sums' variance over the sum of the pixels' variances. About normal
-        for independent pixels of any distribution, above `_LIMIT` for filters wider than a pixel and for random
-        numbers shared between pixels.
+        Smallest p-value over blocks of 2, 8, 32 pixels and the whole image, times their number. Small for filters wider
+        than a pixel and for random numbers shared between pixels.
 
     Notes
     -----
     Differences of two images are symmetric around 0, so that under independence every pixel's sign is a fair coin
-    given its size. That gives the exact mean and variance of the block sums' squares without any model of the noise.
+    given its size. That gives the exact mean and variance of the sum of squared block sums without any model of the
+    noise; its tail is that of the chi-square distribution with the same two moments [Satterthwaite 1946].
     """
     pairs = len(images) // 2
     differences = images[0 : 2 * pairs : 2] - images[1 : 2 * pairs : 2]
     height, width = differences.shape[1:]
-    highest = -np.inf
-    for side in (*_SIDES, max(height, width)):
+    sides = (*_SIDES, max(height, width))
+    smallest = 1.0
+    for side in sides:
         tall, wide = min(side, height), min(side, width)
         rows, columns = height // tall, width // wide
         cut = differences[:, : rows * tall, : columns * wide]
         blocks = cut.reshape(pairs, rows, tall, columns, wide).swapaxes(2, 3).reshape(-1, tall * wide)
         squares = (blocks**2).sum(axis=1)
-        excess = (blocks.sum(axis=1) ** 2 - squares).sum()
+        mean = squares.sum()
         variance = 2 * (squares**2 - (blocks**4).sum(axis=1)).sum()
         if variance > 0:
-            highest = max(highest, float(excess / np.sqrt(variance)))
-    return highest
+            freedom = 2 * mean**2 / variance
+            statistic = (blocks.sum(axis=1) ** 2).sum() * freedom / mean
+            smallest = min(smallest, float(stats.chi2.sf(statistic, freedom)))
+    return min(1.0, len(sides) * smallest)
 
 
 def independent(images: Floats) -> bool:
-    """Whether `correlation` gives no reason to doubt that pixels are independent."""
-    return correlation(images) <= _LIMIT
+    """Whether `p_value` gives no reason to doubt that pixels are independent."""
+    return p_value(images) > _LEVEL

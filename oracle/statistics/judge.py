@@ -38,6 +38,8 @@ _SUSPICION_SHARES = {"brighter": 0.45, "darker": 0.45, "not black": 0.1}
 _BLACK_LEVEL = 1e-3
 # A bet on "too dark" must know how bright a pixel can get: this many times the brightest seen before.
 _HEADROOM = 2.0
+# Neighbours that differ by this factor have an edge between them.
+_EDGE = 1.5
 # Such a bet is lost, rather than worth less than nothing, should a pixel exceed even that.
 _LOST = 1e-6
 # Standard errors by which a Monte Carlo expectation widens the interval of right values (union over 1e6 pixels).
@@ -214,19 +216,31 @@ def _forecast(null: _Null, observed: Floats) -> _Forecast:
     variance, headroom = np.empty_like(relative), np.empty_like(relative)
     is_open = np.broadcast_to(null.lit | null.black, relative.shape).copy()
     is_open[0] &= ~quarter
+    smooth = null.lit & _is_smooth(null.mean)
     for k in range(len(observed)):
         known = null.lit & (quarter if k == 0 else True)
         past = slice(0, max(k, 1))
-        variance[k] = _smooth(squares[past].mean(axis=0), known, size=9 if k == 0 else 5)
-        highest_ratio = np.where(known, relative[past], 1.0).max(axis=(0, 2, 3))[:, None, None]
-        highest = np.where(known, observed[past], 0.0).max(axis=(0, 2, 3))[:, None, None]
-        headroom[k] = _HEADROOM * np.minimum(
-            highest_ratio, np.maximum(highest / np.where(null.lit, null.mean, 1.0), 1.0)
+        variance[k] = _local_mean(squares[past].mean(axis=0), known, size=9 if k == 0 else 5)
+        headroom[k] = _HEADROOM * np.where(
+            smooth, _highest(relative[past], known & smooth), _highest(relative[past], known)
         )
     return _Forecast(variance, headroom, is_open)
 
 
-def _smooth(squares: Floats, known: Booleans, size: int) -> Floats:
+def _is_smooth(mean: Floats) -> Booleans:
+    """Where the expected image has no edge: there, values far above the mean are the renderer's own."""
+    window = (1, 3, 3)
+    result: Booleans = ndimage.maximum_filter(mean, window) < _EDGE * ndimage.minimum_filter(mean, window)
+    return result
+
+
+def _highest(relative: Floats, known: Booleans) -> Floats:
+    """Largest observed over expected value among known pixels of images (K, P, height, width), shape (P, 1, 1)."""
+    highest: Floats = np.where(known, relative, 1.0).max(axis=(0, 2, 3))[:, None, None]
+    return highest
+
+
+def _local_mean(squares: Floats, known: Booleans, size: int) -> Floats:
     """Local means of squared deviations over the known pixels, with a tenth of their global mean mixed in."""
     weights = known.astype(np.float64)
     total = weights.sum(axis=(1, 2), keepdims=True)
@@ -295,8 +309,10 @@ def _bet_on_boxes(null: _Null, observed: Floats, bank: tuple[Scale, ...]) -> lis
         entries = []
         for scale in bank:
             expected = scale.sums(np.where(mask, limit, 0.0))
-            measured = scale.sums(np.where(mask, observed, 0.0))
-            deviation = np.where(expected > 0, measured / np.where(expected > 0, expected, 1.0) - 1, 0.0)
+            measured = np.maximum(scale.sums(np.where(mask, observed, 0.0)), 0.0)
+            # Differences of sums leave rounding errors where nothing is expected.
+            matters = expected > 1e-9 * expected.max()
+            deviation = np.where(matters, measured / np.where(matters, expected, 1.0) - 1, 0.0)
             stakes = _BOX_STAKES[:, None, None, None] * np.ones_like(deviation)
             if suspicion == "darker":
                 # How bright a box can get is known only from the images before.

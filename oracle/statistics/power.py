@@ -58,7 +58,7 @@ def power(
     The pixels' own values, scaled to the bias in question, give mean and variance of the logarithm of a factor, with
     any skewness they have; sums over many pixels are normal.
     """
-    if ratios.size == 0:
+    if ratios.size == 0 or ratios.mean() == 0:
         return None, None, None
     bets = ratios.size
     sample = slice(None, None, max(1, bets // _SAMPLE))

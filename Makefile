@@ -1,0 +1,53 @@
+# Every target sets up what it needs first; on a fresh machine python3, make and a C++ compiler are enough.
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint sanitize wheel-test lock clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 16
+
+setup: ## system packages, .venv, extension: whatever is not there yet
+	@.ci/setup
+
+demo: setup ## grade a right and a wrong renderer
+	@.venv/bin/oracle demo
+
+test: setup ## all tests
+	@.venv/bin/pytest -n auto
+
+lint: setup ## ruff and mypy
+	@.venv/bin/ruff check
+	@.venv/bin/ruff format --check
+	@.venv/bin/mypy
+
+# The sanitized extension goes into a folder of its own, and -S keeps the editable install from hiding it. AddressSanitizer
+# wants to be loaded first and, to see C++ exceptions, libstdc++ next. Uncaptured, as its reports end the process.
+sanitize: setup ## the tracer's tests under AddressSanitizer and UndefinedBehaviorSanitizer
+	@rm -rf build/sanitize/site
+	@.venv/bin/python -m pip install -q --disable-pip-version-check --no-build-isolation --no-deps \
+	    --target build/sanitize/site --config-settings=build-dir=build/sanitize/cmake --config-settings=install.strip=false \
+	    --config-settings=cmake.build-type=RelWithDebInfo --config-settings=cmake.define.ORACLE_SANITIZE=ON .
+	@packages=$$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
+	compiler=$${CXX:-c++}; \
+	ASAN_OPTIONS=detect_leaks=0 \
+	LD_PRELOAD="$$($$compiler -print-file-name=libasan.so):$$($$compiler -print-file-name=libstdc++.so)" \
+	PYTHONPATH="$(CURDIR)/build/sanitize/site:$$packages" \
+	.venv/bin/python -SP -m pytest -p no:cacheprovider --capture=no tests/test_tracer.py
+
+# Source archive, wheel from it, empty environment, foreign folder: what a user of the wheel gets.
+wheel-test: setup ## build the wheel, install it elsewhere and run the demo there
+	@set -eu; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
+	.venv/bin/python -m build --no-isolation --outdir "$$folder/dist" . >"$$folder/log" || { cat "$$folder/log"; exit 1; }; \
+	sed -n 's/^\([a-z0-9.-]*==[^\\]*\).*/\1/p' requirements.lock >"$$folder/constraints.txt"; \
+	.venv/bin/python -m venv "$$folder/venv"; \
+	"$$folder/venv/bin/python" -m pip install -q --disable-pip-version-check -c "$$folder/constraints.txt" "$$folder"/dist/*.whl; \
+	mkdir "$$folder/elsewhere"; cd "$$folder/elsewhere"; "$$folder/venv/bin/oracle" demo --quick
+
+lock: ## resolve requirements.lock anew
+	@set -eu; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
+	python3 -m venv "$$folder"; "$$folder/bin/pip" install -q --disable-pip-version-check uv; \
+	"$$folder/bin/uv" pip compile --quiet --upgrade --universal --python-version 3.11 --group dev --generate-hashes \
+	    --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file requirements.lock pyproject.toml
+
+clean: ## remove .venv, builds and caches
+	@rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	@find . -name __pycache__ -prune -exec rm -rf {} +

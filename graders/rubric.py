@@ -1,0 +1,77 @@
+"""What a course asks: cases, points, tolerance and error budget."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from oracle.statistics import MIN_IMAGES
+from reference_scenes.families import FAMILIES
+from reference_scenes.loading import load_toml, suggest
+from reference_scenes.model import Model
+
+
+class CaseOfRubric(Model):
+    """One family to be graded; `spp` defaults to what suits the family."""
+
+    family: str
+    points: Annotated[float, Field(ge=0, le=1e6)] = 10.0
+    spp: Annotated[int, Field(ge=1, le=1 << 20)] | None = None
+    tolerance: Annotated[float, Field(gt=0, le=0.5)] | None = None
+
+    @model_validator(mode="after")
+    def _family_exists(self) -> Self:
+        if self.family not in FAMILIES:
+            raise ValueError(f"family {self.family!r} does not exist; {suggest(self.family, list(FAMILIES))}")
+        return self
+
+
+class Rubric(Model):
+    """All that a grading needs besides the submission and the seed.
+
+    Attributes
+    ----------
+    error_budget : float
+        Largest probability with which a right submission may lose a point, shared by all cases.
+    tolerance : float
+        Relative bias that still counts as right.
+    detectable_bias : float
+        "Right" is said only if a global bias of this size would have been found with 99 % probability.
+    max_images : int
+        A case that is still undecided after this many images stays undecided.
+    timeout : float
+        Seconds that one image may take.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    error_budget: Annotated[float, Field(gt=0, le=0.1)] = 1e-4
+    tolerance: Annotated[float, Field(gt=0, le=0.5)] = 0.005
+    detectable_bias: Annotated[float, Field(gt=0, le=1)] = 0.02
+    max_images: Annotated[int, Field(ge=MIN_IMAGES, le=1024)] = 16
+    timeout: Annotated[float, Field(gt=0, le=3600)] = 60.0
+    cases: Annotated[tuple[CaseOfRubric, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        names = [case.family for case in self.cases]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise ValueError(f"cases name {', '.join(sorted(twice))} more than once")
+        largest = max(case.tolerance or self.tolerance for case in self.cases)
+        if self.detectable_bias <= largest:
+            raise ValueError(f"detectable_bias {self.detectable_bias} must exceed every tolerance, here {largest}")
+        return self
+
+
+def load_rubric(path: Path) -> Rubric:
+    """Read a rubric from a TOML file; raises InvalidFile."""
+    return load_toml(path, Rubric)
+
+
+def ready_rubric(name: str) -> Rubric:
+    """One of the rubrics that come with the package, by file name without suffix."""
+    with resources.as_file(resources.files("graders") / "rubrics" / f"{name}.toml") as path:
+        return load_rubric(path)

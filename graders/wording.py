@@ -1,0 +1,38 @@
+"""Evidence in words."""
+
+from __future__ import annotations
+
+from oracle.statistics import Evidence, Place, Verdict
+
+
+def reason(evidence: Evidence) -> str:
+    """One sentence that says what was found."""
+    match evidence.verdict:
+        case Verdict.WRONG if evidence.place is not None:
+            return _wrong(evidence, evidence.place)
+        case Verdict.RIGHT:
+            bias = max(evidence.detectable_brighter or 0.0, evidence.detectable_darker or 0.0)
+            return f"a global bias of {_percent(bias)} or more would have been found with 99 % probability"
+        case _ if evidence.distinct_images == 1 < evidence.images:
+            return "all images are the same although their seeds differ, and one is too noisy for a verdict"
+        case _:
+            if evidence.images_needed is None:
+                return "the noise is too strong or too alike between pixels for a verdict, and more images would not help"
+            return f"the noise is too strong for a verdict; about {evidence.images_needed} images would decide"
+
+
+def _wrong(evidence: Evidence, place: Place) -> str:
+    overall = evidence.ratios.get("all")
+    total = f"; the whole image has {_percent(overall.estimate)} of the expected light" if overall else ""
+    where = f"in the {place.width} x {place.height} pixels at x = {place.x}, y = {place.y}"
+    channel = "" if place.channel == "all" else f" in {place.channel}"
+    if place.ratio is None:
+        return f"light{channel} where there should be none, {where}{total}"
+    comparison = "too bright" if place.suspicion == "brighter" else "too dark"
+    return f"{comparison}{channel}: {_percent(place.ratio)} of the expected light {where}{total}"
+
+
+def _percent(value: float) -> str:
+    """A ratio in percent with three significant digits."""
+    percent = 100 * value
+    return f"{percent:.0f} %" if percent >= 100 else f"{percent:.3g} %"

@@ -1,0 +1,59 @@
+// Rays against triangles: the geometry below the path tracer. Knows Embree, knows nothing of Python.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "embree_compat.h"
+
+namespace oracle {
+
+struct Vec3 {
+    float x, y, z;
+};
+
+struct Triangle {
+    uint32_t a, b, c;
+};
+
+struct Hit {
+    double t;          // in units of the direction's length; infinity for a miss
+    int64_t triangle;  // -1 for a miss
+    float u, v;        // the hit is (1 - u - v) a + u b + v c
+};
+
+// Embree skips geometry beyond 1.8e18 without a word, so nothing may lie beyond this.
+constexpr float largest_coordinate = 1e18f;
+
+// A frozen set of triangles. Queries are const and may run on any number of threads at once.
+class RayCaster {
+public:
+    // Indices must be below `vertex_count`, coordinates finite and at most `largest_coordinate`.
+    RayCaster(const Vec3* vertices, size_t vertex_count, const Triangle* triangles, size_t triangle_count);
+
+    // The nearest hit with t >= 0: a ray that starts on a triangle hits it. The direction is finite
+    // and not zero, of any length.
+    Hit closest_hit(const Vec3& origin, const Vec3& direction) const;
+
+    // Whether anything is hit with 0 <= t <= t_far.
+    bool occluded(const Vec3& origin, const Vec3& direction, double t_far) const;
+
+private:
+    struct Release {
+        void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+        void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+        void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+    };
+    template <typename Handle>
+    using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
+
+    Owned<RTCDevice> device_;  // before the scene: members die in reverse order
+    Owned<RTCScene> scene_;
+};
+
+// The version of the Embree library that is loaded, such as "4.3.3".
+std::string embree_version();
+
+}  // namespace oracle
