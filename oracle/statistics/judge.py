@@ -241,15 +241,14 @@ def _highest(relative: Floats, known: Booleans) -> Floats:
 
 
 def _local_mean(squares: Floats, known: Booleans, size: int) -> Floats:
-    """Local means of squared deviations over the known pixels, with a tenth of their global mean mixed in."""
+    """Local means of squared deviations over the known pixels; their global mean where none is near."""
     weights = known.astype(np.float64)
     total = weights.sum(axis=(1, 2), keepdims=True)
     overall = (squares * weights).sum(axis=(1, 2), keepdims=True) / np.maximum(total, 1)
     window = (1, size, size)
     near = ndimage.uniform_filter(weights, window, mode="constant")
     local = ndimage.uniform_filter(squares * weights, window, mode="constant")
-    local = np.where(near > 1e-9, np.maximum(local, 0) / np.maximum(near, 1e-9), overall)
-    result: Floats = 0.9 * local + 0.1 * overall
+    result: Floats = np.where(near > 1e-9, np.maximum(local, 0) / np.maximum(near, 1e-9), overall)
     return result
 
 

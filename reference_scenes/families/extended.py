@@ -83,7 +83,7 @@ class RectangleHorizonParameters(Parameters):
     half_width: Metres
     half_height: Metres
     rise: Annotated[float, Field(ge=-1, le=1)]
-    turn: Annotated[float, Field(ge=-60, le=60)]
+    turn: Annotated[float, Field(ge=-85, le=85)]
     lean: Annotated[float, Field(ge=-45, le=45)]
     azimuth: Degrees
     radiance: model.Spectrum
@@ -92,14 +92,14 @@ class RectangleHorizonParameters(Parameters):
 
 
 def _draw_rectangle_horizon(rng: np.random.Generator) -> RectangleHorizonParameters:
-    turn = uniform(rng, 30, 45) * (1 if rng.random() < 0.5 else -1)
+    turn = uniform(rng, 60, 72) * (1 if rng.random() < 0.5 else -1)
     return RectangleHorizonParameters(
-        distance=uniform(rng, 1.4, 1.6),
+        distance=uniform(rng, 1.2, 1.4),
         half_width=uniform(rng, 0.3, 0.5),
         half_height=uniform(rng, 0.5, 0.8),
         rise=uniform(rng, -0.2, 0.2),
         turn=turn,
-        lean=uniform(rng, 10, 25),
+        lean=uniform(rng, 5, 15),
         azimuth=uniform(rng, 0, 360),
         radiance=building.draw_colour(rng, 10),
         reflectance=building.draw_albedo(rng),

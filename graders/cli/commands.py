@@ -1,0 +1,152 @@
+"""The commands and their options; each only reads its arguments and hands over."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+from graders.cli import EXIT_INFRASTRUCTURE, EXIT_RIGHT, EXIT_WRONG
+
+_PATH = click.Path(path_type=Path)
+_SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Draws the scenes.")
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+_JOBS = click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    default=lambda: len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+    show_default="number of cores",
+    help="Cases rendered at the same time.",
+)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="render-oracle", prog_name="oracle")
+def oracle() -> None:
+    """Says whether the light in a renderer's images is right, how sure it is, and how many points that costs.
+
+    Exit codes: 0 all is right; 1 graded, and something is not right; 2 the command line or one of its files is wrong;
+    3 the machine failed, not the submission; 130 interrupted.
+    """
+
+
+@oracle.command()
+@click.option("--quick", is_flag=True, help="Four families only.")
+@click.option("--out", type=_PATH, default=Path("oracle-demo"), show_default=True, help="Folder for the results.")
+@_SEED
+@_JOBS
+def demo(quick: bool, out: Path, seed: int, jobs: int) -> int:
+    """Grade Mitsuba 3, a right student renderer, and the same student with 16 bugs.
+
+    Needs a C++ compiler. Exits with 0 if both right renderers are right and every bug is caught.
+    """
+    from graders.cli.demo import run_demo
+
+    return EXIT_RIGHT if run_demo(quick, out, seed, jobs) else EXIT_WRONG
+
+
+@oracle.command()
+@click.argument("path", type=_PATH)
+@click.option("--rubric", type=_PATH, help="Rubric file; the ten families of 'first-light' without it.")
+@click.option("--out", type=_PATH, default=Path("oracle-result"), show_default=True, help="Folder for the results.")
+@_SEED
+@_JOBS
+@_JSON
+def grade(path: Path, rubric: Path | None, out: Path, seed: int, jobs: int, as_json: bool) -> int:
+    """Grade the submission in PATH, a folder with a submission.toml or that file."""
+    from graders.cli.grade import run_grade
+
+    return _exit_code(run_grade(path, rubric, out, seed, jobs, as_json))
+
+
+@oracle.command()
+@click.argument("images", nargs=-1, required=True, type=_PATH)
+@click.option("--scene", required=True, help="Name of the family, see 'oracle scenes list'.")
+@_SEED
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0, 0.5, min_open=True),
+    default=0.005,
+    show_default=True,
+    help="Relative bias that counts as right.",
+)
+@click.option(
+    "--encoding",
+    type=click.Choice(["linear", "srgb"]),
+    default="linear",
+    show_default=True,
+    help="What the pixels hold; PNG needs srgb.",
+)
+@_JSON
+def judge(images: tuple[Path, ...], scene: str, seed: int, tolerance: float, encoding: str, as_json: bool) -> int:
+    """Judge IMAGES of one scene, rendered with different seeds.
+
+    The scene is the one that 'oracle scenes export SCENE --seed N' writes. Several images say more than one.
+    """
+    from graders.cli.judge import run_judge
+
+    return _exit_code({run_judge(images, scene, seed, tolerance, encoding, as_json): 1})
+
+
+@oracle.group()
+def scenes() -> None:
+    """List, show, export and validate scenes."""
+
+
+@scenes.command("list")
+@_JSON
+def list_scenes(as_json: bool) -> None:
+    """List the canonical families."""
+    from graders.cli.scenes import run_list
+
+    run_list(as_json)
+
+
+@scenes.command("show")
+@click.argument("name")
+@_SEED
+@_JSON
+def show_scene(name: str, seed: int, as_json: bool) -> None:
+    """Show a family: its law, formula and source, and the member that the seed draws."""
+    from graders.cli.scenes import run_show
+
+    run_show(name, seed, as_json)
+
+
+@scenes.command("export")
+@click.argument("names", nargs=-1)
+@click.option("--all", "every", is_flag=True, help="All families.")
+@click.option("--format", "format_name", required=True, help="json or mitsuba3.")
+@click.option("-o", "--out", required=True, type=_PATH, help="Folder; each scene gets a subfolder of its own.")
+@_SEED
+def export_scenes(names: tuple[str, ...], every: bool, format_name: str, out: Path, seed: int) -> None:
+    """Write scenes in a renderer's format."""
+    from graders.cli.scenes import run_export
+
+    run_export(names, every, format_name, out, seed)
+
+
+@scenes.command("validate")
+@click.argument("files", nargs=-1, required=True, type=_PATH)
+@_JSON
+def validate_scenes(files: tuple[Path, ...], as_json: bool) -> int:
+    """Check scene FILES in native JSON; exits with 1 if one is not valid."""
+    from graders.cli.scenes import run_validate
+
+    return EXIT_RIGHT if run_validate(files, as_json) else EXIT_WRONG
+
+
+@oracle.command()
+@_JSON
+def doctor(as_json: bool) -> int:
+    """Tell what this installation can do, and how to mend what it cannot."""
+    from graders.cli.doctor import run_doctor
+
+    return EXIT_RIGHT if run_doctor(as_json) else EXIT_INFRASTRUCTURE
+
+
+def _exit_code(verdicts: dict[str, int]) -> int:
+    if verdicts.get("infrastructure-error"):
+        return EXIT_INFRASTRUCTURE
+    return EXIT_RIGHT if set(verdicts) <= {"right"} else EXIT_WRONG
