@@ -10,8 +10,8 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,27 +21,30 @@ from graders.errors import InfrastructureError
 
 # Of what a program prints, this many last bytes are kept.
 _KEPT_BYTES = 8192
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ufeff]")
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069\ufeff]")
 _ESCAPE = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)?|.)", re.DOTALL)
-
+# Why a program does not start although nothing is wrong with it.
+_MACHINE_AT_FAULT = {errno.EAGAIN, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO}
 
 # Programs that run now, so that an interrupted grading can end them: they are in sessions of their own.
 _running: set[subprocess.Popen[bytes]] = set()
+_may_start = True
+_starting = threading.Lock()
 
 
 @dataclass(frozen=True)
 class Completed:
-    """How a program ended: exit code (negative for a signal), None when stopped at the time limit."""
+    """How a program ended: exit code (negative for a signal), None when stopped at its time limit [s]."""
 
     exit_code: int | None
     output: str
-    seconds: float
+    limit: float
 
     @property
     def failure(self) -> str | None:
         """What went wrong in words, None if nothing did."""
         if self.exit_code is None:
-            return f"did not finish within {self.seconds:.0f} s and was stopped"
+            return f"did not finish within {self.limit:g} s and was stopped"
         if self.exit_code < 0:
             try:
                 name = signal.Signals(-self.exit_code).name
@@ -72,14 +75,12 @@ def run(arguments: Sequence[str], folder: Path, scratch: Path, timeout: float) -
 
     Raises
     ------
+    CannotStart
+        If there is no such program.
     InfrastructureError
         If this machine could not even try.
     """
-    started = time.monotonic()
-    try:
-        process = start(arguments, folder, environment(scratch), stdin=subprocess.DEVNULL, stderr=subprocess.STDOUT)
-    except CannotStart as error:
-        return Completed(127, str(error), 0.0)
+    process = start(arguments, folder, environment(scratch), stdin=subprocess.DEVNULL, stderr=subprocess.STDOUT)
     assert process.stdout is not None
     tail = Tail(process.stdout)
     try:
@@ -88,12 +89,11 @@ def run(arguments: Sequence[str], folder: Path, scratch: Path, timeout: float) -
         exit_code = None
     finally:
         kill_group(process)
-    output = tail.text()
-    return Completed(exit_code, output, time.monotonic() - started)
+    return Completed(exit_code, tail.text(), timeout)
 
 
 class CannotStart(Exception):
-    """The program is not there or is no program."""
+    """The program is not there or is no program; the message is one line."""
 
 
 def start(
@@ -108,29 +108,47 @@ def start(
     InfrastructureError
         If this machine is.
     """
+    program = arguments[0]
     try:
-        process = subprocess.Popen(
-            list(arguments),
-            cwd=folder,
-            env=variables,
-            stdin=stdin,
-            stdout=subprocess.PIPE,
-            stderr=stderr,
-            start_new_session=True,
-        )
-    except (FileNotFoundError, PermissionError, NotADirectoryError) as error:
-        raise CannotStart(f"cannot run {arguments[0]}: {error.strerror}") from None
+        with _starting:
+            if not _may_start:
+                raise InfrastructureError("the grading was interrupted")
+            process = subprocess.Popen(
+                list(arguments),
+                cwd=folder,
+                env=variables,
+                stdin=stdin,
+                stdout=subprocess.PIPE,
+                stderr=stderr,
+                start_new_session=True,
+            )
+            _running.add(process)
+    except ValueError as error:
+        raise CannotStart(f"cannot run {one_line(program)}: {error}") from None
     except OSError as error:
-        if error.errno == errno.ENOEXEC:
-            raise CannotStart(f"cannot run {arguments[0]}: {error.strerror}") from None
-        raise InfrastructureError(f"cannot start a process: {error.strerror}") from error
-    _running.add(process)
+        if error.errno in _MACHINE_AT_FAULT or error.filename == str(folder):
+            raise InfrastructureError(f"cannot start a process: {error.strerror}") from error
+        reason = error.strerror
+        if error.errno == errno.ENOENT and shutil.which(program, path=variables.get("PATH")):
+            reason = "the interpreter in its first line does not exist"
+        raise CannotStart(f"cannot run {one_line(program)}: {reason}") from None
     return process
 
 
+def allow_all() -> None:
+    """Let programs start, again after `stop_all`."""
+    global _may_start
+    with _starting:
+        _may_start = True
+
+
 def stop_all() -> None:
-    """End every program that still runs."""
-    for process in list(_running):
+    """End every program that still runs, and start no other."""
+    global _may_start
+    with _starting:
+        _may_start = False
+        running = list(_running)
+    for process in running:
         kill_group(process)
 
 
@@ -147,6 +165,7 @@ class Tail:
 
     def __init__(self, pipe: IO[bytes]) -> None:
         self._kept = b""
+        self._is_cut = False
         self._pipe = pipe
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -154,6 +173,7 @@ class Tail:
     def _read(self) -> None:
         with contextlib.suppress(OSError, ValueError):
             while chunk := os.read(self._pipe.fileno(), 65536):
+                self._is_cut |= len(self._kept) + len(chunk) > _KEPT_BYTES
                 self._kept = (self._kept + chunk)[-_KEPT_BYTES:]
 
     def text(self) -> str:
@@ -162,10 +182,31 @@ class Tail:
         self._thread.join(1.0)
         if not self._thread.is_alive():
             self._pipe.close()
-        return printable(self._kept)
+        kept = self._kept
+        # Half a line says nothing, and may begin within a character or an escape sequence.
+        return printable(kept.partition(b"\n")[2] or kept if self._is_cut else kept)
 
 
 def printable(raw: bytes) -> str:
     """Text of a stranger without terminal escapes, control and bidirectional characters."""
     text = raw.decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", _ESCAPE.sub("", text))
+
+
+def one_line(text: str) -> str:
+    """Text of a stranger on one line, for messages."""
+    return " ".join(printable(text.encode("utf-8", errors="replace")).split())
+
+
+class ScratchFolder(tempfile.TemporaryDirectory[str]):
+    """A folder for a stranger's program, removed afterwards whatever the program left in it."""
+
+    def __init__(self, prefix: str) -> None:
+        super().__init__(prefix=prefix, ignore_cleanup_errors=True)
+
+    def cleanup(self) -> None:
+        """Remove the folder."""
+        try:
+            super().cleanup()
+        except RecursionError:
+            subprocess.run(["rm", "-rf", "--", self.name], check=False)

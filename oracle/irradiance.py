@@ -136,7 +136,9 @@ def polygon(emitter: Polygon, receivers: Receivers) -> Floats:
     # Along the horizon all crossings lie on one line, so that their angles from any one of them stay below pi.
     reference = np.zeros_like(crossings[0][0])
     for crossing, sign in crossings:
-        reference = np.where((np.abs(reference).sum(axis=-1) == 0)[..., None] & (sign != 0)[..., None], crossing, reference)
+        reference = np.where(
+            (np.abs(reference).sum(axis=-1) == 0)[..., None] & (sign != 0)[..., None], crossing, reference
+        )
     for crossing, sign in crossings:
         swept = np.arctan2(dot(n, np.cross(reference, crossing)), dot(reference, crossing))
         contour += sign * np.where(sign != 0, swept, 0.0)

@@ -209,9 +209,7 @@ def _two_pieces(
         low, high = np.zeros(count), np.ones(count)
         for _ in range(_BISECTIONS):
             t = (low + high) / 2
-            _, here = image(
-                cells.x + cells.side * (x0 + t * (x1 - x0)), cells.y + cells.side * (y0 + t * (y1 - y0))
-            )
+            _, here = image(cells.x + cells.side * (x0 + t * (x1 - x0)), cells.y + cells.side * (y0 + t * (y1 - y0)))
             same = here == label
             low, high = np.where(same, t, low), np.where(same, high, t)
         t = (low + high) / 2

@@ -20,13 +20,6 @@ from oracle.statistics import Verdict
 
 # What deserves attention comes first.
 _ORDER = (Verdict.WRONG, Verdict.UNGRADABLE, Verdict.UNDECIDED, Verdict.INFRASTRUCTURE_ERROR, Verdict.RIGHT)
-_SYMBOLS = {
-    Verdict.WRONG: "✗",
-    Verdict.UNGRADABLE: "⊘",
-    Verdict.UNDECIDED: "?",
-    Verdict.INFRASTRUCTURE_ERROR: "!",
-    Verdict.RIGHT: "✓",
-}
 _MEANINGS = {
     Verdict.WRONG: "The light differs from what the law demands by more than the tolerance; noise does not explain it.",
     Verdict.UNGRADABLE: "There was no image that could be judged: the submission failed, or its image is broken.",
@@ -104,7 +97,7 @@ def write_html(result: Result, folder: Path) -> str:
             result=result,
             cases=[_case_view(f"case-{index}", case, result.submission.scene_format, folder) for index, case in ranked],
             tally=[(verdict, result.verdicts[verdict]) for verdict in _ORDER if result.verdicts.get(verdict)],
-            symbols=_SYMBOLS,
+            symbols=text.SYMBOLS,
             meanings={verdict: _MEANINGS[verdict] for verdict in _ORDER},
             nothing_ran=all(case.verdict == Verdict.UNGRADABLE for case in result.cases),
             legend=_data_uri(pictures.legend()),
@@ -126,7 +119,7 @@ def _case_view(anchor: str, case: CaseResult, scene_format: str, folder: Path) -
         overall=evidence.ratios.get("all") if evidence else None,
         detectable=detectable,
         figures=_figures(case, folder),
-        sentences=_sentences(evidence, case.tolerance) if evidence else (),
+        sentences=_sentences(evidence, case.verdict, case.tolerance) if evidence else (),
         command=f"oracle scenes export {shlex.quote(case.family)} --seed {case.seed}"
         f" --format {shlex.quote(scene_format)} -o {shlex.quote(f'{case.family}-{case.seed}')}",
     )
@@ -147,7 +140,7 @@ def _interval(interval: IntervalResult) -> str:
     return f"{low[:-2]} to {high}"
 
 
-def _sentences(evidence: EvidenceResult, tolerance: float) -> tuple[str, ...]:
+def _sentences(evidence: EvidenceResult, verdict: Verdict, tolerance: float) -> tuple[str, ...]:
     """The evidence in words."""
     sentences = []
     overall = evidence.ratios.get("all")
@@ -156,7 +149,8 @@ def _sentences(evidence: EvidenceResult, tolerance: float) -> tuple[str, ...]:
             f"Observed light in the whole image is {_ratio(overall)} of the expected light,"
             f" 99\N{NO-BREAK SPACE}% interval {_interval(overall)}."
         )
-    sentences.append(f"{_power(evidence)}; up to {text.percent(tolerance)} is tolerated.")
+    tolerated = f"a bias of up to {text.percent(tolerance)} is tolerated."
+    sentences.append(tolerated.capitalize() if verdict == Verdict.WRONG else f"{_power(evidence)}; {tolerated}")
     sentences.append(
         f"The evidence against the renderer, an e-value, is {text.power_of_ten(evidence.log10_e_value)}."
         f" From {text.power_of_ten(evidence.log10_threshold)} on the verdict is wrong; a right renderer ever gets"

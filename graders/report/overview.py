@@ -12,15 +12,6 @@ from markupsafe import Markup
 
 from graders.report import text
 from graders.result import Result
-from oracle.statistics import Verdict
-
-_SYMBOLS = {
-    Verdict.RIGHT: "✓",
-    Verdict.WRONG: "✗",
-    Verdict.UNDECIDED: "?",
-    Verdict.UNGRADABLE: "⊘",
-    Verdict.INFRASTRUCTURE_ERROR: "!",
-}
 
 
 def overview_html(results: Mapping[str, Result]) -> str:
@@ -48,7 +39,7 @@ def overview_html(results: Mapping[str, Result]) -> str:
         template.render(
             results=results,
             first=first,
-            symbols=_SYMBOLS,
+            symbols=text.SYMBOLS,
             style=Markup(style),  # noqa: S704 - a file of this package
             style_hash=base64.b64encode(hashlib.sha256(style.encode()).digest()).decode(),
         )

@@ -5,6 +5,16 @@ from __future__ import annotations
 import math
 import re
 
+from oracle.statistics import Verdict
+
+SYMBOLS = {
+    Verdict.RIGHT: "✓",
+    Verdict.WRONG: "✗",
+    Verdict.UNDECIDED: "?",
+    Verdict.UNGRADABLE: "⊘",
+    Verdict.INFRASTRUCTURE_ERROR: "!",
+}
+
 # What XML 1.0 forbids, other control characters, and bidirectional controls, which could make a name look like another.
 _UNPRINTABLE = re.compile(
     r"[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]|[\u007f-\u009f\u200e\u200f\u202a-\u202e\u2066-\u2069\ufeff]"

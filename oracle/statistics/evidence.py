@@ -61,7 +61,7 @@ class Evidence:
         Observed over expected light of the whole image, for "all" channels together and for each by name.
     detectable_brighter, detectable_darker : float or None
         The smallest global bias in either direction that these images would have revealed with 99 % probability;
-        None if no bias would.
+        None if no bias would, and for a wrong verdict.
     place : Place or None
         Where the evidence is strongest; None unless wrong.
     images_needed : int or None

@@ -45,6 +45,8 @@ _LOST = 1e-6
 # Standard errors by which a Monte Carlo expectation widens the interval of right values (union over 1e6 pixels).
 _EXPECTATION_ERRORS = 7.0
 _CONFIDENCE = 0.99
+# Evidence in all channels together is preferred to that in one if its logarithm is at least this part of it.
+_NEARLY = 0.9
 # Two images that differ by less than this fraction of their mean radiance are one.
 _SAME_IMAGE = 1e-5
 
@@ -155,8 +157,9 @@ def judge(
         images=len(images),
         distinct_images=count,
         ratios=_ratios(null, observed, pixels_independent),
-        detectable_brighter=brighter,
-        detectable_darker=darker,
+        # What a wrong renderer's images would have revealed had it been right, nobody knows.
+        detectable_brighter=None if verdict == Verdict.WRONG else brighter,
+        detectable_darker=None if verdict == Verdict.WRONG else darker,
         place=_place(null, observed, wealth) if verdict == Verdict.WRONG else None,
         images_needed=images_needed if verdict == Verdict.UNDECIDED else None,
         assumptions=_assumptions(len(images), count, pixels_independent),
@@ -259,9 +262,7 @@ def _share(scale: str, suspicion: str, components: int) -> float:
     return _SCALE_SHARES[scale] * _SUSPICION_SHARES[suspicion] / components
 
 
-def _bet_on_pixels(
-    null: _Null, observed: Floats, forecast: _Forecast, bank: tuple[Scale, ...]
-) -> list[_Wealth]:
+def _bet_on_pixels(null: _Null, observed: Floats, forecast: _Forecast, bank: tuple[Scale, ...]) -> list[_Wealth]:
     """Stake on every pixel of every image; the wealth of a box is the product over its pixels."""
     lit, black = forecast.open & null.lit, forecast.open & null.black
     above = observed / null.high - 1
@@ -274,9 +275,14 @@ def _bet_on_pixels(
         stake = np.minimum(amplitude / (forecast.variance + amplitude**2), MAX_STAKE)
         return np.log1p(np.where(lit, stake, 0.0) * above)
 
+    # A pixel above the headroom shows that such bets were unfair so far: they start again with the next image.
+    surprised = (lit & (observed > forecast.headroom * null.mean)).any(axis=(1, 2, 3))
+    fair = np.arange(len(observed)) > np.flatnonzero(np.append(True, surprised))[-1] - 1
+    dark_bets = lit & fair[:, None, None, None]
+
     def darker(amplitude: float) -> Floats:
         stake = np.minimum(amplitude / (forecast.variance + amplitude**2), most)
-        return np.log(np.maximum(1 - np.where(lit, stake, 0.0) * below, _LOST))
+        return np.log(np.maximum(1 - np.where(dark_bets, stake, 0.0) * below, _LOST))
 
     def not_black(stake: float) -> Floats:
         return np.log1p(np.where(black, stake, 0.0) * above)
@@ -292,7 +298,9 @@ def _bet_on_pixels(
         wealth += _shared(suspicion, [(scale, scale.sums(gains)) for scale in bank])
         pixels = gains.reshape(*gains.shape[:2], -1)
         wealth.append(
-            _Wealth(suspicion, single_pixels(*gains.shape[2:]), pixels + np.log(_share("pixels", suspicion, pixels.size)))
+            _Wealth(
+                suspicion, single_pixels(*gains.shape[2:]), pixels + np.log(_share("pixels", suspicion, pixels.size))
+            )
         )
     return wealth
 
@@ -366,9 +374,12 @@ def _ratios(null: _Null, observed: Floats, pixels_independent: bool) -> dict[str
 
 
 def _place(null: _Null, observed: Floats, wealth: list[_Wealth]) -> Place:
-    """The box in which some suspicion has grown richest."""
+    """The box in which some suspicion has grown richest, of all channels together if they say nearly as much."""
     best = max(wealth, key=lambda w: float(w.logs.max()))
-    _, p, box = np.unravel_index(int(best.logs.argmax()), best.logs.shape)
+    logs = best.logs
+    if logs[:, 0].max() >= _NEARLY * logs.max():
+        logs = logs[:, :1]
+    _, p, box = np.unravel_index(int(logs.argmax()), logs.shape)
     scale = best.scale
     x0, x1, y0, y1 = (int(bound[box]) for bound in (scale.x0, scale.x1, scale.y0, scale.y1))
     mask = (null.black if best.suspicion == "not black" else null.lit)[p, y0:y1, x0:x1]

@@ -18,6 +18,8 @@ _QUANTILE = float(stats.norm.ppf(0.99))
 _BIASES = np.geomspace(1e-3, 4.0, 120)
 # More pixel values than this add nothing to what is known of their distribution.
 _SAMPLE = 1 << 15
+_LITTLE_NOISE = 1e-4
+_CLOSE = 0.7
 
 
 def power(
@@ -62,8 +64,11 @@ def power(
         return None, None, None
     bets = ratios.size
     sample = slice(None, None, max(1, bets // _SAMPLE))
-    values = ratios[sample] / ratios.mean()
-    variance, headroom = variance[sample], headroom[sample]
+    # A pixel above the headroom makes bets on "too dark" start again; where one came close, half of them may be lost.
+    kept = 0.5 if (ratios > _CLOSE * headroom).any() else 1.0
+    values, variance, headroom = ratios[sample], variance[sample], headroom[sample]
+    # The renderer's own bias is taken out as well as it is known, that is, mostly from pixels with little noise.
+    values = values / np.average(values, weights=1 / (variance + _LITTLE_NOISE))
 
     found: list[float | None] = []
     needed: list[float] = []
@@ -79,7 +84,8 @@ def power(
             stakes = amplitudes[:, None] / (expected_square + amplitudes[:, None] ** 2)
             stakes = np.minimum(stakes, MAX_STAKE if sign > 0 else darker_limit(headroom, limit))
             gains = np.log(np.maximum(1 + sign * stakes * (biased / limit - 1), 1e-6))
-            return bets * gains.mean(axis=1), bets * gains.var(axis=1)
+            count = bets if sign > 0 else kept * bets
+            return count * gains.mean(axis=1), count * gains.var(axis=1)
 
         def is_found(bias: float) -> bool:
             mean, variance_of_gain = growth(bias)
