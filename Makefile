@@ -1,6 +1,6 @@
 # Every target sets up what it needs first; on a fresh machine python3, make and a C++ compiler are enough.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint sanitize wheel-test lock clean
+.PHONY: help setup demo test lint sanitize wheel-test lock calibrate generate picture clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 16
@@ -47,6 +47,20 @@ lock: ## resolve requirements.lock anew
 	python3 -m venv "$$folder"; "$$folder/bin/pip" install -q --disable-pip-version-check uv; \
 	"$$folder/bin/uv" pip compile --quiet --upgrade --universal --python-version 3.11 --group dev --generate-hashes \
 	    --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file requirements.lock pyproject.toml
+
+calibrate: setup ## false alarms and power of the judge, by simulation; minutes
+	@PYTHONPATH=tests .venv/bin/python tests/calibration.py
+
+generate: setup ## rewrite the parts of docs that come from the code
+	@.venv/bin/python docs/generate.py
+
+# Chromium draws a page as a user sees it; nothing is loaded from anywhere.
+picture: setup ## draw the README's picture of a report anew; needs chromium
+	@set -eu; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
+	.venv/bin/oracle demo --out "$$folder/demo" >"$$folder/log" || { cat "$$folder/log"; exit 1; }; \
+	chromium --headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-sync \
+	    --user-data-dir="$$folder/profile" --hide-scrollbars --window-size=1200,1110 \
+	    --screenshot=docs/images/report.png "file://$$folder/demo/bugs/no-light-cosine/report.html" >/dev/null 2>&1
 
 clean: ## remove .venv, builds and caches
 	@rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
