@@ -59,7 +59,7 @@ picture: setup ## draw the README's picture of a report anew; needs chromium
 	@set -eu; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
 	.venv/bin/oracle demo --out "$$folder/demo" >"$$folder/log" || { cat "$$folder/log"; exit 1; }; \
 	chromium --headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-sync \
-	    --user-data-dir="$$folder/profile" --hide-scrollbars --window-size=1200,1110 \
+	    --user-data-dir="$$folder/profile" --hide-scrollbars --window-size=1200,1250 \
 	    --screenshot=docs/images/report.png "file://$$folder/demo/bugs/no-light-cosine/report.html" >/dev/null 2>&1
 
 clean: ## remove .venv, builds and caches
