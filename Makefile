@@ -49,7 +49,7 @@ lock: ## resolve requirements.lock anew
 	    --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file requirements.lock pyproject.toml
 
 calibrate: setup ## false alarms and power of the judge, by simulation; minutes
-	@PYTHONPATH=tests .venv/bin/python tests/calibration.py
+	@PYTHONPATH=tests .venv/bin/python tests/calibration.py 1000
 
 generate: setup ## rewrite the parts of docs that come from the code
 	@.venv/bin/python docs/generate.py
