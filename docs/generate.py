@@ -8,10 +8,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from pydantic import BaseModel, TypeAdapter
+
 from graders.result import Result
 from graders.rubric import Rubric
 from graders.submission import Submission
-from pydantic import BaseModel, TypeAdapter
 from reference_scenes.families import FAMILIES
 from reference_scenes.model import Scene
 
@@ -37,8 +38,8 @@ def _families() -> str:
         "# Families",
         "",
         "Each canonical scene is a family: a seed draws one member, with its camera, sizes, colours and positions. The",
-        "same seed gives the same member everywhere. All have expectations in closed form, exact for any number of bounces,",
-        "since nothing but the receiver reflects. `oracle scenes show NAME --seed N` prints what a seed draws.",
+        "same seed gives the same member everywhere. All have expectations in closed form, exact for any number of",
+        "bounces, since nothing but the receiver reflects. `oracle scenes show NAME --seed N` prints what a seed draws.",
     ]
     for family in FAMILIES.values():
         document = (family.parameters.__doc__ or "").strip()

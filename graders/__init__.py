@@ -1,0 +1,1 @@
+"""Submissions in; verdicts, points and reports out."""

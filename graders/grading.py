@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import datetime
 import hashlib
-import tempfile
+import os
+import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -17,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from graders import processes, wording
-from graders.decoding import BadImage, read_image, srgb_quantisation
+from graders.decoding import BadImage, read_image, rgbe_quantisation, srgb_quantisation
 from graders.errors import InfrastructureError
-from graders.rendering import Built, RenderFailed, Renderer, Request, build, existing_images, renderer
+from graders.processes import ScratchFolder, one_line
+from graders.rendering import Built, Renderer, RenderFailed, Request, build, existing_images, renderer
 from graders.result import CaseResult, CaseTimes, EvidenceResult, GradingTimes, ImagesOfCase, Result, SubmissionResult
 from graders.rubric import CaseOfRubric, Rubric
 from graders.submission import ImagesSubmission, Submission
@@ -102,22 +105,21 @@ def render_seed(family: str, seed: int, index: int) -> int:
 # ------------------------------------------------------------------------------------------------ one case
 
 
-def judge_images(case: Case, images: Sequence[Floats], encoding: str) -> Evidence:
-    """Judge images of a case that are already linear."""
-    expectation = expectation_of(case.family, case.seed)
-    if encoding == "srgb":
-        expectation = _as_seen_through_srgb(expectation)
+def judge_images(case: Case, images: Sequence[Floats], output: str) -> Evidence:
+    """Judge images of a case that are already linear and came in the format `output`."""
+    expectation = _as_seen_through(output, expectation_of(case.family, case.seed))
     return judge(expectation, np.stack(images), case.tolerance, case.error_budget, case.detectable_bias)
 
 
-def _as_seen_through_srgb(expectation: Expectation) -> Expectation:
-    """Widen the expectation by half a step of 8 bits, and leave out what a display's white may have cut off."""
-    radiance = expectation.radiance
-    return dataclasses.replace(
-        expectation,
-        error_bound=expectation.error_bound + srgb_quantisation(np.minimum(radiance, 1.0)),
-        valid=expectation.valid & (radiance <= _BRIGHTEST_JUDGED_IN_SRGB).all(axis=2),
-    )
+def _as_seen_through(output: str, expectation: Expectation) -> Expectation:
+    """Widen the expectation by what the format rounds, and leave out what a display's white may have cut off."""
+    radiance, error, valid = expectation.radiance, expectation.error_bound, expectation.valid
+    if output == "hdr":
+        error = error + rgbe_quantisation(radiance)
+    elif output == "png":
+        error = error + srgb_quantisation(np.minimum(radiance, 1.0))
+        valid = valid & (radiance <= _BRIGHTEST_JUDGED_IN_SRGB).all(axis=2)
+    return dataclasses.replace(expectation, error_bound=error, valid=valid)
 
 
 def grade_case(case: Case, built: Built, max_images: int, timeout: float) -> Judged:
@@ -130,15 +132,15 @@ def grade_case(case: Case, built: Built, max_images: int, timeout: float) -> Jud
     try:
         if built.failure is not None:
             raise RenderFailed(built.failure, "")
-        with tempfile.TemporaryDirectory(prefix="oracle-", ignore_cleanup_errors=True) as name:
-            source = _Images(case, built, Path(name), timeout)
+        with ScratchFolder("oracle-") as name:
+            source = _Images(case, built, Path(name).resolve(), timeout)
             try:
                 wanted = MIN_IMAGES
                 while True:
                     before = time.monotonic()
                     images += source.more(wanted - len(images))
                     rendering += time.monotonic() - before
-                    evidence = judge_images(case, images, built.submission.render.encoding)
+                    evidence = judge_images(case, images, built.submission.render.output)
                     if evidence.verdict != Verdict.UNDECIDED or source.exhausted(images, evidence, max_images):
                         break
                     wanted = _next_count(len(images), evidence.images_needed, max_images)
@@ -150,7 +152,7 @@ def grade_case(case: Case, built: Built, max_images: int, timeout: float) -> Jud
     except BadImage as failure:
         verdict, reason = Verdict.UNGRADABLE, str(failure)
     except (InfrastructureError, OSError, MemoryError) as failure:
-        verdict, reason = Verdict.INFRASTRUCTURE_ERROR, f"{type(failure).__name__}: {failure}"
+        verdict, reason = Verdict.INFRASTRUCTURE_ERROR, one_line(f"{type(failure).__name__}: {failure}")
 
     family = FAMILIES[case.family]
     observed = np.mean(images, axis=0) if images else None
@@ -193,10 +195,7 @@ class _Images:
         self._renderer: Renderer | None = None
         self._existing: list[Path] | None = None
         if isinstance(built.submission, ImagesSubmission):
-            self._existing = list(existing_images(built.submission, built.source, case.family))
-            if not self._existing:
-                pattern = built.submission.render.images.replace("{case}", case.family)
-                raise RenderFailed(f"no image matches {pattern}", "")
+            self._existing = existing_images(built.submission, built.source, case.family)
         else:
             self._scene = export(case.scene, built.submission.scene_format, scratch / "scene")
             self._renderer = renderer(built, timeout, scratch)
@@ -210,15 +209,22 @@ class _Images:
         images = []
         for _ in range(count):
             folder = self._scratch / f"image-{self._count}"
-            folder.mkdir()
+            try:
+                folder.mkdir()
+            except (FileNotFoundError, FileExistsError, NotADirectoryError, PermissionError):
+                if self._count == 0:
+                    raise
+                # That was the renderer, not the machine: no points are to be saved in this way.
+                raise RenderFailed("the renderer spoilt the folder it was given to work in", self._log) from None
             path = folder / f"image.{output}"
             seed = render_seed(self._case.family, self._case.seed, self._count)
             request = Request(self._scene, path, self._case.spp, seed, film.width, film.height)
             self._log = self._renderer.render(request) or self._log
-            if not path.exists():
+            if not os.path.lexists(path):
                 raise RenderFailed(f"the renderer succeeded but wrote no image{_found_instead(folder)}", self._log)
             images.append(read_image(path, output, film.width, film.height))
-            path.unlink()
+            with contextlib.suppress(RecursionError):
+                shutil.rmtree(folder, ignore_errors=True)
             self._count += 1
         return images
 
@@ -229,15 +235,16 @@ class _Images:
     def close(self) -> str:
         """End the renderer; return what the submission printed last."""
         if self._renderer is not None:
-            self._renderer.close()
+            self._log = self._renderer.close() or self._log
         return self._log
 
 
 def _found_instead(folder: Path) -> str:
-    found = sorted(path.name for path in folder.iterdir())
-    if not found:
-        return " at {output}"
-    return f" at {{output}}; it left {processes.printable(', '.join(found[:3]).encode('utf-8', 'replace'))} instead"
+    try:
+        found = sorted(path.name for path in folder.iterdir())
+    except OSError:
+        return ", and its folder is gone or closed"
+    return f" at {{output}}; it left {', '.join(found[:3])} instead" if found else " at {output}"
 
 
 # ------------------------------------------------------------------------------------------ whole gradings
@@ -273,13 +280,14 @@ def grade(
     started = datetime.datetime.now(datetime.UTC)
     clock = time.monotonic()
     cases = cases_of(rubric, seed)
+    processes.allow_all()
     with (
-        tempfile.TemporaryDirectory(prefix="oracle-build-", ignore_cleanup_errors=True) as name,
+        ScratchFolder("oracle-build-") as name,
         ThreadPoolExecutor(workers) as pool,
     ):
         try:
             expectations = [pool.submit(expectation_of, case.family, case.seed) for case in cases]
-            built = _build_all(jobs, Path(name))
+            built = _build_all(jobs, Path(name).resolve())
             for expectation in expectations:
                 expectation.result()
             futures: dict[Future[Judged], tuple[int, int]] = {

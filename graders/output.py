@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import secrets
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,9 +30,13 @@ def require_writable(folder: Path) -> None:
         If they cannot.
     """
     try:
+        str(folder).encode()
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
+    except UnicodeEncodeError:
+        # The libraries that write images and reports want text.
+        raise UsageError(f"{folder}: its name is not UTF-8; choose another folder with --out") from None
     except OSError as error:
         raise UsageError(f"{folder}: cannot write there: {error.strerror}; choose another folder with --out") from None
 
@@ -64,18 +68,14 @@ def write_grading(folder: Path, result: Result, judged: Sequence[Judged]) -> Res
 
 def replace(path: Path, content: bytes) -> None:
     """Write a file beside its place and move it there, so that nobody ever sees half of it."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
-        with os.fdopen(descriptor, "wb") as file:
+        with temporary.open("xb") as file:
             file.write(content)
-        # mkstemp makes private files; results are for everybody whom the folder admits.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, path)
+        temporary.replace(path)
     except BaseException:
         with contextlib.suppress(OSError):
-            os.unlink(name)
+            temporary.unlink()
         raise
 
 
@@ -83,31 +83,31 @@ def _write_images(folder: Path, judged: Judged) -> None:
     images = judged.result.images
     if images is None or judged.expected is None:
         return
-    _write_exr(folder / images.expected, judged.expected)
+    replace(folder / images.expected, _exr(judged.expected))
     if images.observed is not None and images.difference is not None and judged.observed is not None:
         expected, observed = judged.expected, judged.observed
         least = max(_DARKEST * float(expected.mean()), float(np.finfo(np.float32).tiny))
-        _write_exr(folder / images.observed, observed)
-        _write_exr(folder / images.difference, (observed - expected) / np.maximum(expected, least))
+        replace(folder / images.observed, _exr(observed))
+        replace(folder / images.difference, _exr((observed - expected) / np.maximum(expected, least)))
 
 
-def _write_exr(path: Path, image: Floats) -> None:
-    """Write linear RGB (height, width, 3) as 32-bit OpenEXR, always the same bytes for the same image."""
+def _exr(image: Floats) -> bytes:
+    """Linear RGB (height, width, 3) as a file in 32-bit OpenEXR, always the same bytes for the same image."""
     height, width, channels = image.shape
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.exr")
     spec = oiio.ImageSpec(width, height, channels, "float")
     spec["compression"] = "zip"
-    writer = oiio.ImageOutput.create(str(temporary))
-    try:
+    # Otherwise the time of writing.
+    spec["DateTime"] = "1970:01:01 00:00:00"
+    # OpenImageIO writes only files.
+    with tempfile.TemporaryDirectory(prefix="oracle-") as folder:
+        path = Path(folder) / "image.exr"
+        writer = oiio.ImageOutput.create(str(path))
         if (
             writer is None
-            or not writer.open(str(temporary), spec)
+            or not writer.open(str(path), spec)
             or not writer.write_image(np.ascontiguousarray(image, dtype=np.float32))
             or not writer.close()
         ):
             reason = (writer.geterror() if writer else oiio.geterror()) or "unknown error"
             raise InfrastructureError(f"{path}: cannot be written: {reason.splitlines()[0]}")
-        os.replace(temporary, path)
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+        return path.read_bytes()

@@ -21,7 +21,7 @@ from graders.errors import InfrastructureError
 
 # Of what a program prints, this many last bytes are kept.
 _KEPT_BYTES = 8192
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069\ufeff]")
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _ESCAPE = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)?|.)", re.DOTALL)
 # Why a program does not start although nothing is wrong with it.
 _MACHINE_AT_FAULT = {errno.EAGAIN, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO}
@@ -126,7 +126,7 @@ def start(
     except ValueError as error:
         raise CannotStart(f"cannot run {one_line(program)}: {error}") from None
     except OSError as error:
-        if error.errno in _MACHINE_AT_FAULT or error.filename == str(folder):
+        if error.errno in _MACHINE_AT_FAULT or str(error.filename) == str(folder):
             raise InfrastructureError(f"cannot start a process: {error.strerror}") from error
         reason = error.strerror
         if error.errno == errno.ENOENT and shutil.which(program, path=variables.get("PATH")):

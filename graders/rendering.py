@@ -3,26 +3,39 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import os
+import re
 import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from graders import processes
-from graders.processes import CannotStart, Tail
+from graders import processes, python_worker
+from graders.errors import InfrastructureError
+from graders.processes import CannotStart, Tail, one_line
 from graders.submission import CommandSubmission, ImagesSubmission, PythonSubmission, Submission
+
+# Images that exist already are all read at once.
+_MOST_IMAGES = 1024
+# How long a message may get that quotes a submission.
+_QUOTED = 300
+# A worker's answer is short, and a worker that gave none ends at once [s].
+_LONGEST_ANSWER = 1 << 20
+_GRACE = 1.0
+# What CMake says of its own speed.
+_CMAKE_SECONDS = re.compile(r"^(-- \w+ done) \(\d+\.\d+s\)$", re.MULTILINE)
 
 
 class RenderFailed(Exception):
     """The submission did not render; the message is one line, `log` what it printed."""
 
     def __init__(self, message: str, log: str) -> None:
-        super().__init__(message)
+        super().__init__(one_line(message))
         self.log = log
 
 
@@ -56,21 +69,34 @@ def build(submission: Submission, source: Path, folder: Path) -> Built:
     if not isinstance(submission, CommandSubmission) or submission.build is None:
         return Built(submission, source, made)
     log = ""
-    deadline = time.monotonic() + submission.build.timeout
+    limit = submission.build.timeout
+    deadline = time.monotonic() + limit
+    places = {"source": source, "build": made, "scratch": folder}
     for command in submission.build.commands:
-        arguments = [_filled(argument, source=source, build=made) for argument in command]
-        completed = processes.run(arguments, source, folder, max(deadline - time.monotonic(), 0.1))
-        log += completed.output
-        if completed.failure is not None:
-            return Built(submission, source, made, log, f"build failed: {arguments[0]} {completed.failure}")
+        arguments = [_filled(argument, places) for argument in command]
+        try:
+            completed = processes.run(arguments, source, folder, max(deadline - time.monotonic(), 0.1))
+        except CannotStart as error:
+            return Built(submission, source, made, log, f"build failed: {_neutral(str(error), places)}")
+        output = _CMAKE_SECONDS.sub(r"\1", _neutral(completed.output, places))
+        log += output
+        failure = dataclasses.replace(completed, limit=limit).failure
+        if failure is not None:
+            return Built(submission, source, made, log, f"build failed: {command[0]} {failure}{_first_error(output)}")
     return Built(submission, source, made, log)
 
 
-def _filled(template: str, **values: object) -> str:
+def _filled(template: str, values: Mapping[str, object]) -> str:
     """Replace placeholders; other braces stay as they are."""
-    for name, value in values.items():
-        template = template.replace("{" + name + "}", str(value))
-    return template
+    return re.sub(r"{(\w+)}", lambda found: str(values.get(found[1], found[0])), template)
+
+
+def _neutral(text: str, places: Mapping[str, Path]) -> str:
+    """What a submission printed, with placeholders for the folders of this grading, which are others each time."""
+    for name, path in sorted(places.items(), key=lambda place: -len(str(place[1]))):
+        if path.parent != path:
+            text = re.sub(re.escape(str(path)) + r"(?![\w.-])", f"{{{name}}}", text)
+    return text
 
 
 class Renderer:
@@ -80,13 +106,15 @@ class Renderer:
         self._built = built
         self._timeout = timeout
         self._scratch = scratch
+        self._places = {"source": built.source, "build": built.build, "scratch": scratch}
 
     def render(self, request: Request) -> str:
         """Render one image and return what the submission printed; raises RenderFailed."""
         raise NotImplementedError
 
-    def close(self) -> None:
-        """End what still runs."""
+    def close(self) -> str:
+        """End what still runs; return what the submission printed and `render` did not return."""
+        return ""
 
 
 class CommandRenderer(Renderer):
@@ -95,14 +123,16 @@ class CommandRenderer(Renderer):
     def render(self, request: Request) -> str:
         """See `Renderer`."""
         assert isinstance(self._built.submission, CommandSubmission)
-        arguments = [
-            _filled(argument, source=self._built.source, build=self._built.build, **vars(request))
-            for argument in self._built.submission.render.command
-        ]
-        completed = processes.run(arguments, request.output.parent, self._scratch, self._timeout)
+        values = {"source": self._built.source, "build": self._built.build, **vars(request)}
+        arguments = [_filled(argument, values) for argument in self._built.submission.render.command]
+        try:
+            completed = processes.run(arguments, request.output.parent, self._scratch, self._timeout)
+        except CannotStart as error:
+            raise RenderFailed(_neutral(str(error), self._places), "") from None
+        log = _neutral(completed.output, self._places)
         if completed.failure is not None:
-            raise RenderFailed(f"the renderer {completed.failure}{_last_line(completed.output)}", completed.output)
-        return completed.output
+            raise RenderFailed(f"the renderer {completed.failure}{_last_line(log)}", log)
+        return log
 
 
 class PythonRenderer(Renderer):
@@ -113,63 +143,67 @@ class PythonRenderer(Renderer):
 
     def render(self, request: Request) -> str:
         """See `Renderer`."""
+        failure = self._failure(request)
+        if failure is not None:
+            raise RenderFailed(_neutral(failure, self._places), self.close())
+        return ""
+
+    def _failure(self, request: Request) -> str | None:
+        """Have one image rendered; return what went wrong in words, None if nothing did."""
         process = self._started()
         assert process.stdin is not None
         assert process.stdout is not None
         message = {name: str(value) if isinstance(value, Path) else value for name, value in vars(request).items()}
-        answer = b""
+        answer: bytes | None = b""
         with contextlib.suppress(BrokenPipeError):
             process.stdin.write(json.dumps(message).encode() + b"\n")
             process.stdin.flush()
             answer = _read_line(process.stdout.fileno(), self._timeout)
         if answer is None:
-            self.close()
-            raise RenderFailed(f"the renderer did not finish within {self._timeout:.0f} s and was stopped", self._log())
+            return f"the renderer did not finish within {self._timeout:g} s and was stopped"
         if not answer:
-            exit_code = process.wait()
-            self.close()
-            failure = processes.Completed(exit_code, "", 0.0).failure or "ended without an answer"
-            raise RenderFailed(f"the renderer's process {failure}", self._log())
+            try:
+                completed = processes.Completed(process.wait(_GRACE), "", _GRACE)
+            except subprocess.TimeoutExpired:
+                return "the renderer closed the pipe on which its process answers"
+            return f"the renderer's process {completed.failure or 'ended without an answer'}"
         try:
             error = json.loads(answer)["error"]
         except (ValueError, KeyError, TypeError):
             error = "gave no valid answer"
-        if error is not None:
-            log = self._log_after_close()
-            raise RenderFailed(f"the renderer failed: {processes.printable(str(error).encode())[:300]}", log)
-        return ""
+        return None if error is None else f"the renderer failed: {one_line(str(error))[:_QUOTED]}"
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None:
             assert isinstance(self._built.submission, PythonSubmission)
-            variables = processes.environment(self._scratch) | {"PYTHONPATH": str(self._built.source)}
-            self._process = processes.start(
-                [sys.executable, "-m", "graders.python_worker", self._built.submission.render.callable],
-                self._scratch,
-                variables,
-                stdin=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-            )
+            # A submission's files are no part of this program, and reading them must not leave any behind.
+            variables = processes.environment(self._scratch) | {"PYTHONDONTWRITEBYTECODE": "1"}
+            function = self._built.submission.render.callable
+            try:
+                self._process = processes.start(
+                    [sys.executable, "-P", python_worker.__file__, function, str(self._built.source)],
+                    self._scratch,
+                    variables,
+                    stdin=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                )
+            except CannotStart as error:
+                raise InfrastructureError(str(error)) from None
             assert self._process.stderr is not None
             self._errors = Tail(self._process.stderr)
         return self._process
 
-    def _log(self) -> str:
-        return self._errors.text()
-
-    def _log_after_close(self) -> str:
-        self.close()
-        return self._log()
-
-    def close(self) -> None:
+    def close(self) -> str:
         """See `Renderer`."""
-        if self._process is not None:
-            processes.kill_group(self._process)
-            for pipe in (self._process.stdin, self._process.stdout):
-                if pipe is not None:
-                    with contextlib.suppress(BrokenPipeError):
-                        pipe.close()
-            self._process = None
+        if self._process is None:
+            return ""
+        processes.kill_group(self._process)
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    pipe.close()
+        self._process = None
+        return _neutral(self._errors.text(), self._places)
 
 
 def _read_line(descriptor: int, timeout: float) -> bytes | None:
@@ -182,9 +216,11 @@ def _read_line(descriptor: int, timeout: float) -> bytes | None:
             if not selector.select(max(deadline - time.monotonic(), 0)):
                 return None
             chunk = os.read(descriptor, 65536)
-            if not chunk or len(line) > 1 << 20:
+            if not chunk:
                 return b""
             line += chunk
+            if len(line) > _LONGEST_ANSWER:
+                break
     return line
 
 
@@ -195,15 +231,34 @@ def renderer(built: Built, timeout: float, scratch: Path) -> Renderer:
     return CommandRenderer(built, timeout, scratch)
 
 
-def existing_images(submission: ImagesSubmission, source: Path, case: str) -> Iterator[Path]:
-    """The images that a submission brings for a case, in the order of their names."""
-    yield from sorted(source.glob(submission.render.images.replace("{case}", case)))
+def existing_images(submission: ImagesSubmission, source: Path, case: str) -> list[Path]:
+    """The images that a submission brings for a case, in the order of their names; raises RenderFailed."""
+    pattern = submission.render.images.replace("{case}", case)
+    try:
+        found = sorted(source.glob(pattern))
+    except (ValueError, NotImplementedError, RecursionError, OSError) as error:
+        raise RenderFailed(f"images that match {pattern} cannot be looked for: {error}", "") from None
+    if not found:
+        raise RenderFailed(f"no image matches {pattern}", "")
+    if len(found) > _MOST_IMAGES:
+        raise RenderFailed(f"{len(found)} images match {pattern}; at most {_MOST_IMAGES} are judged", "")
+    home = os.path.realpath(source)
+    for path in found:
+        if not Path(os.path.realpath(path.parent)).is_relative_to(home):
+            raise RenderFailed(f"{path.relative_to(source)}: lies outside the submission's folder", "")
+    return found
 
 
 def _last_line(output: str) -> str:
     """The last thing a program said, which is most often the reason."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
-    return f": {lines[-1][:200]}" if lines else ""
+    return f": {lines[-1][:_QUOTED]}" if lines else ""
+
+
+def _first_error(output: str) -> str:
+    """The first line in which a compiler speaks of an error, else the last line."""
+    errors = [line.strip() for line in output.splitlines() if re.search(r"\berror\b", line, re.IGNORECASE)]
+    return f": {errors[0][:_QUOTED]}" if errors else _last_line(output)
 
 
 __all__ = [

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from oracle.statistics import Evidence, Place, Verdict
 
+# A box whose ratio differs from the image's by less than this fraction is the image.
+_SAME = 1e-9
+
 
 def reason(evidence: Evidence) -> str:
     """One sentence that says what was found."""
@@ -17,7 +20,7 @@ def reason(evidence: Evidence) -> str:
             return "all images are the same although their seeds differ, and one is too noisy for a verdict"
         case _:
             if evidence.images_needed is None:
-                return "the noise is too strong or too alike between pixels for a verdict, and more images would not help"
+                return "the noise is too strong or too alike between pixels for a verdict; more images would not help"
             return f"the noise is too strong for a verdict; about {evidence.images_needed} images would decide"
 
 
@@ -29,10 +32,15 @@ def _wrong(evidence: Evidence, place: Place) -> str:
     if place.ratio is None:
         return f"light{channel} where there should be none, {where}{total}"
     comparison = "too bright" if place.suspicion == "brighter" else "too dark"
+    same = evidence.ratios.get(place.channel)
+    if same is not None and abs(place.ratio - same.estimate) < _SAME * same.estimate:
+        return f"{comparison}{channel}: the whole image has {_percent(place.ratio)} of the expected light"
     return f"{comparison}{channel}: {_percent(place.ratio)} of the expected light {where}{total}"
 
 
 def _percent(value: float) -> str:
-    """A ratio in percent with three significant digits."""
+    """A ratio in percent with three significant digits, and with those that matter near 100 %."""
     percent = 100 * value
+    if 90 < percent < 110:
+        return f"{percent:.2f} %"
     return f"{percent:.0f} %" if percent >= 100 else f"{percent:.3g} %"

@@ -1,0 +1,1 @@
+"""What is true: closed forms of light, the statistics of judging, ray casting."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from oracle.arrays import Floats, InvalidArgument, direction, finite, non_negative
+from oracle.arrays import Floats, InvalidArgument, direction, finite, spectrum, vector
 
 
 def _set(instance: object, **values: object) -> None:
@@ -20,13 +20,18 @@ def _set(instance: object, **values: object) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Receivers:
-    """Oriented points that light falls on: points [m] and unit normals, each of shape (..., 3)."""
+    """Oriented points that light falls on: points [m] and normals (any length), broadcast to one shape (..., 3)."""
 
     points: Floats
     normals: Floats
 
     def __post_init__(self) -> None:
-        _set(self, points=finite("points", self.points, (3,)), normals=direction("normals", self.normals))
+        points, normals = finite("points", self.points, (3,)), direction("normals", self.normals)
+        try:
+            shape = np.broadcast_shapes(points.shape, normals.shape)
+        except ValueError:
+            raise InvalidArgument(f"points {points.shape} and normals {normals.shape} do not fit together") from None
+        _set(self, points=np.broadcast_to(points, shape), normals=np.broadcast_to(normals, shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +44,8 @@ class Point:
     def __post_init__(self) -> None:
         _set(
             self,
-            position=finite("position", self.position, (3,)),
-            intensity=non_negative("intensity", self.intensity),
+            position=vector("position", self.position),
+            intensity=spectrum("intensity", self.intensity),
         )
 
 
@@ -61,9 +66,9 @@ class Spot:
     def __post_init__(self) -> None:
         _set(
             self,
-            position=finite("position", self.position, (3,)),
-            direction=direction("direction", self.direction),
-            intensity=non_negative("intensity", self.intensity),
+            position=vector("position", self.position),
+            direction=direction("direction", vector("direction", self.direction)),
+            intensity=spectrum("intensity", self.intensity),
         )
         if not 0 < self.beam_width < self.cutoff_angle < np.pi:
             raise InvalidArgument(
@@ -82,8 +87,8 @@ class Directional:
     def __post_init__(self) -> None:
         _set(
             self,
-            direction=direction("direction", self.direction),
-            irradiance=non_negative("irradiance", self.irradiance),
+            direction=direction("direction", vector("direction", self.direction)),
+            irradiance=spectrum("irradiance", self.irradiance),
         )
 
 
@@ -102,7 +107,7 @@ class Polygon:
         vertices = finite("vertices", self.vertices, (3,))
         if vertices.ndim != 2 or len(vertices) < 3:
             raise InvalidArgument(f"vertices has shape {vertices.shape}, a polygon needs (N, 3) with N >= 3")
-        _set(self, vertices=vertices, radiance=non_negative("radiance", self.radiance))
+        _set(self, vertices=vertices, radiance=spectrum("radiance", self.radiance))
         relative = vertices - vertices[0]
         size = float(np.abs(relative).max())
         doubled_area = self._area_vector()
@@ -111,11 +116,25 @@ class Polygon:
         off_plane = np.abs(relative @ self.normal)
         if off_plane.max() > 1e-9 * size:
             raise InvalidArgument(f"vertices[{int(off_plane.argmax())}] lies {off_plane.max():g} m off the plane")
+        crossing = self._first_crossing()
+        if crossing:
+            raise InvalidArgument("vertices: the edges that begin at [{}] and [{}] cross".format(*crossing))
 
     def _area_vector(self) -> Floats:
         relative = self.vertices - self.vertices[0]
         total: Floats = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
         return total
+
+    def _first_crossing(self) -> tuple[int, int] | None:
+        """The first two edges that pass through each other; edges that only touch do not count."""
+        a = self.vertices - self.vertices[0]
+        b = np.roll(a, -1, axis=0)
+        # side[i, j]: on which side of edge i vertex j lies, and with `across` whether edge i separates the ends of j.
+        side = np.einsum("k,ijk->ij", self.normal, np.cross((b - a)[:, None], a[None] - a[:, None]))
+        side[np.abs(side) <= 1e-12 * np.abs(a).max() ** 2] = 0
+        across = side * np.roll(side, -1, axis=1) < 0
+        crossings = np.argwhere(across & across.T)
+        return (int(crossings[0, 0]), int(crossings[0, 1])) if crossings.size else None
 
     @property
     def normal(self) -> Floats:
@@ -135,9 +154,9 @@ class Disk:
     def __post_init__(self) -> None:
         _set(
             self,
-            center=finite("center", self.center, (3,)),
-            normal=direction("normal", self.normal),
-            radiance=non_negative("radiance", self.radiance),
+            center=vector("center", self.center),
+            normal=direction("normal", vector("normal", self.normal)),
+            radiance=spectrum("radiance", self.radiance),
         )
         if not 0 < self.radius < np.inf:
             raise InvalidArgument(f"radius is {self.radius}, a disk needs a positive one")
@@ -152,7 +171,7 @@ class Sphere:
     radiance: Floats
 
     def __post_init__(self) -> None:
-        _set(self, center=finite("center", self.center, (3,)), radiance=non_negative("radiance", self.radiance))
+        _set(self, center=vector("center", self.center), radiance=spectrum("radiance", self.radiance))
         if not 0 < self.radius < np.inf:
             raise InvalidArgument(f"radius is {self.radius}, a sphere needs a positive one")
 
@@ -164,4 +183,4 @@ class Constant:
     radiance: Floats
 
     def __post_init__(self) -> None:
-        _set(self, radiance=non_negative("radiance", self.radiance))
+        _set(self, radiance=spectrum("radiance", self.radiance))

@@ -102,8 +102,8 @@ def polygon(emitter: Polygon, receivers: Receivers) -> Floats:
     Returns
     -------
     ndarray
-        Irradiance [W/m^2], shape (..., C). Relative error about 1e-10 for a polygon of angular size 1e-6,
-        1e-14 for one of ordinary size.
+        Irradiance [W/m^2], shape (..., C). Its error is below 1e-14 of the radiance; while the whole polygon is well
+        above the horizon also below 1e-15 of the value, divided by the polygon's angular size where that is small.
 
     Notes
     -----
@@ -150,7 +150,8 @@ def polygon(emitter: Polygon, receivers: Receivers) -> Floats:
 
 def _angle_times_axis(start: Floats, end: Floats, n: Floats) -> Floats:
     """Theta (n . Gamma) of the edge from `start` to `end`, both relative to the receiver."""
-    axis = np.cross(start, end)
+    # Not start x end, which loses the digits that both have in common.
+    axis = np.cross(start, end - start)
     sine = np.linalg.norm(axis, axis=-1)
     angle = np.arctan2(sine, dot(start, end))
     result: Floats = angle * dot(n, axis) / np.where(sine == 0, 1.0, sine)
@@ -171,27 +172,27 @@ def disk(emitter: Disk, receivers: Receivers) -> Floats:
     Returns
     -------
     ndarray
-        Irradiance [W/m^2], shape (..., C).
+        Irradiance [W/m^2], shape (..., C); errors as for `polygon`.
 
     Notes
     -----
     Stokes' theorem turns the form-factor integral into ``E = L/2 |closed integral of n . (p x dp) / |p|^2|``
-    [Lambert 1760; Sparrow 1963, eq. 4; Howell's catalogue B-13 for the unclipped parallel case]. On the arc above the horizon the
-    integrand is ``(A + B cos f + C sin f) / (D + F cos f)`` and integrates to elementary functions, written here
-    with ``k = F / (S + D)`` so that nothing cancels when the receiver is on the axis (F = 0). The chord along the
-    horizon contributes its plain angle.
+    [Lambert 1760; Sparrow 1963, eq. 4; Howell's catalogue B-13 for the unclipped parallel case]. On the arc above the
+    horizon the integrand is ``(A + B cos f + C sin f) / (D + F cos f)`` and integrates to elementary functions,
+    written here with ``k = F / (S + D)`` so that nothing cancels when the receiver is on the axis (F = 0). The chord
+    along the horizon contributes its plain angle.
     """
     n = receivers.normals
     offset = emitter.center - receivers.points
     w = emitter.normal
     h = dot(offset, np.broadcast_to(w, offset.shape))
     in_plane = offset - h[..., None] * w
-    rho = np.linalg.norm(in_plane, axis=-1)
-    # The frame of the disk: u points away from the receiver's foot; any direction will do on the axis.
+    # The frame of the disk: u points away from the receiver's foot; any direction will do on the axis. Near the axis
+    # rounding turns u out of the disk's plane, from where it is brought back.
     fallback = np.cross(w, np.eye(3)[np.abs(w).argmin()])
-    fallback = fallback / np.linalg.norm(fallback)
-    on_axis = rho == 0
-    u = np.where(on_axis[..., None], fallback, in_plane / np.where(on_axis, 1.0, rho)[..., None])
+    u = _unit_or(in_plane, fallback)
+    u = _unit_or(u - dot(u, np.broadcast_to(w, u.shape))[..., None] * w, fallback)
+    rho = dot(offset, u)
     v = np.cross(np.broadcast_to(w, u.shape), u)
     r = emitter.radius
     nu, nv, nw, nc = dot(n, u), dot(n, v), dot(n, np.broadcast_to(w, u.shape)), dot(n, offset)
@@ -204,8 +205,8 @@ def disk(emitter: Disk, receivers: Receivers) -> Floats:
 
     # The part of the rim above the horizon: nc + r (nu cos f + nv sin f) >= 0, an arc around `middle`.
     reach = r * np.hypot(nu, nv)
-    half = np.arccos(np.clip(-nc / np.where(reach == 0, 1.0, reach), -1, 1))
-    half = np.where(reach == 0, np.where(nc > 0, np.pi, 0.0), half)
+    cut = np.abs(nc) < reach
+    half = np.where(cut, np.arccos(np.where(cut, -nc, 0.0) / np.where(cut, reach, 1.0)), np.where(nc > 0, np.pi, 0.0))
     middle = np.arctan2(nv, nu)
     first, last = middle - half, middle + half
 
@@ -227,10 +228,19 @@ def disk(emitter: Disk, receivers: Receivers) -> Floats:
     start = offset + r * (np.cos(first)[..., None] * u + np.sin(first)[..., None] * v)
     end = offset + r * (np.cos(last)[..., None] * u + np.sin(last)[..., None] * v)
     chord = np.arctan2(dot(n, np.cross(end, start)), dot(end, start))
-    contour = arc + np.where((half > 0) & (half < np.pi), chord, 0.0)
+    contour = arc + np.where(cut, chord, 0.0)
 
     in_front = h < 0
     result: Floats = np.where(in_front, np.abs(contour) / 2, 0.0)[..., None] * emitter.radiance
+    return result
+
+
+def _unit_or(vectors: Floats, fallback: Floats) -> Floats:
+    """Vectors (..., 3) scaled to length 1, and `fallback` (3,) in place of those without length."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    result: Floats = np.where(
+        length > 0, vectors / np.where(length > 0, length, 1.0), fallback / np.linalg.norm(fallback)
+    )
     return result
 
 
@@ -243,12 +253,13 @@ def sphere(emitter: Sphere, receivers: Receivers) -> Floats:
     emitter : Sphere
         Center [m], radius [m] and radiance [W/(m^2 sr)], shape (C,).
     receivers : Receivers
-        Points [m], outside of the sphere, and unit normals, shape (..., 3).
+        Points [m] and unit normals, shape (..., 3). Inside the sphere, which shines outwards, the result is 0.
 
     Returns
     -------
     ndarray
-        Irradiance [W/m^2], shape (..., C).
+        Irradiance [W/m^2], shape (..., C). Its error is below 1e-14 of the radiance; while the whole sphere is above
+        the horizon also below 1e-15 of the value.
 
     Notes
     -----
@@ -257,6 +268,8 @@ def sphere(emitter: Sphere, receivers: Receivers) -> Floats:
     """
     towards = emitter.center - receivers.points
     distance = np.linalg.norm(towards, axis=-1)
+    inside = distance < emitter.radius
+    distance = np.where(inside, emitter.radius, distance)
     cosine = np.clip(dot(receivers.normals, towards) / distance, -1, 1)
     sine = np.linalg.norm(np.cross(receivers.normals, towards), axis=-1) / distance
     sine2_sigma = (emitter.radius / distance) ** 2
@@ -270,6 +283,7 @@ def sphere(emitter: Sphere, receivers: Receivers) -> Floats:
     y = np.clip(-cot_sigma * cosine / np.where(sine == 0, 1.0, sine), -1, 1)
     root = sine * np.sqrt(1 - y**2)
     cut = (cosine * np.arccos(y) - cot_sigma * root) * sine2_sigma + np.arctan2(root, cot_sigma)
-    factor = np.where(above, np.pi * cosine * sine2_sigma, np.where(below, 0.0, np.maximum(cut, 0.0)))
+    factor = np.where(above, np.pi * cosine * sine2_sigma, np.maximum(cut, 0.0))
+    factor = np.where(below | inside, 0.0, factor)
     result: Floats = factor[..., None] * emitter.radiance
     return result

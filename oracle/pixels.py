@@ -28,7 +28,7 @@ _POINTS_X = np.concatenate([_GAUSS_X, _COARSE_X, _CORNER_X])
 _POINTS_Y = np.concatenate([_GAUSS_Y, _COARSE_Y, _CORNER_Y])
 
 _BISECTIONS = 20
-_SPLITS_BESIDE_AN_EDGE = 3
+_FIRST_SPLIT_TO_FOLLOW_EDGES = 2
 _LAST_SPLIT = 8
 _CELLS_AT_ONCE = 16384
 
@@ -84,25 +84,32 @@ def average(image: Image, width: int, height: int, relative_tolerance: float = 1
     -----
     Smooth cells: tensor Gauss-Legendre quadrature with 3 x 3 nodes, its difference from 2 x 2 nodes as the bound.
     Cells with an edge: the edge is found on the cell's sides by bisection and taken as straight in between; cells
-    are split until the estimate of a parent and the sum of its children agree, and beside an edge down to 1/8 pixel
-    at least. An edge that touches none of the 17 points of a pixel nor of its neighbours goes unseen.
+    are split until the estimate of a parent and the sum of its children agree, down to 1/8 pixel at least. Edges are
+    followed from cell to cell, so that only one that touches none of the 17 points of any pixel goes unseen.
     """
     column, row = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
     pixels = _Cells(np.arange(width * height), column.ravel(), row.ravel(), 1.0)
-    parts = [_estimate(image, chunk, follow_edges=False) for chunk in _chunks(pixels)]
-    mean = np.concatenate([part.mean for part in parts])
-    error = np.concatenate([part.error for part in parts])
-    mixed = np.concatenate([part.mixed for part in parts])
-
-    near = _beside(pixels, mixed)
+    first = _estimate_all(image, pixels, follow_edges=False)
+    mean, error, mixed = first.mean, first.error, first.mixed
     scale = np.abs(mean).mean(axis=0)
     allowed = relative_tolerance * (0.1 * scale + 0.9 * np.abs(mean))
-    refine = near | (error > allowed).any(axis=1)
-    for chunk in _chunks(pixels.take(refine)):
-        indices = chunk.pixel
-        refined_mean, refined_error = _refine(image, chunk, allowed[indices])
-        mean[indices] = refined_mean
-        error[indices] = refined_error
+
+    finished = np.zeros(len(mixed), dtype=np.bool_)
+    pending = _dilated(mixed, width) | (error > allowed).any(axis=1)
+    while pending.any():
+        for chunk in _chunks(pixels.take(pending)):
+            # Pixels around the chunk that hold an edge come along, for the edge to be followed from there.
+            chosen = np.zeros(len(mixed), dtype=np.bool_)
+            chosen[chunk.pixel] = True
+            around = np.flatnonzero(_dilated(chosen, width) & mixed & ~chosen)
+            together = np.concatenate([chunk.pixel, around])
+            refined = _refine(image, pixels.take(together), allowed[together])
+            own = slice(len(chunk.pixel))
+            mean[chunk.pixel], error[chunk.pixel] = refined.mean[own], refined.error[own]
+            mixed[chunk.pixel] |= refined.mixed[own]
+        finished |= pending
+        # An edge may continue into a pixel whose own points had not seen it.
+        pending = _dilated(mixed, width) & ~finished
     channels = mean.shape[1]
     return mean.reshape(height, width, channels), error.reshape(height, width, channels)
 
@@ -112,57 +119,71 @@ def _chunks(cells: _Cells) -> Iterator[_Cells]:
         yield cells.take(slice(start, start + _CELLS_AT_ONCE))
 
 
-def _beside(cells: _Cells, mixed: Booleans) -> Booleans:
-    """Which cells hold an edge or touch a cell that does: the tip of the edge may hide between their points."""
+def _dilated(pixels: Booleans, width: int) -> Booleans:
+    """The given pixels (flat) and their eight neighbours."""
+    grid = np.pad(pixels.reshape(-1, width), 1)
+    rows = grid[:-2] | grid[1:-1] | grid[2:]
+    result: Booleans = (rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]).ravel()
+    return result
+
+
+def _touching(cells: _Cells, chosen: Booleans) -> Booleans:
+    """Which cells are chosen or share a side or a corner with a chosen one."""
     column = np.rint(cells.x / cells.side).astype(np.int64) + 1
     row = np.rint(cells.y / cells.side).astype(np.int64) + 1
     stride = int(column.max()) + 2
     key = row * stride + column
-    with_edge = key[mixed]
-    beside = np.zeros(len(key), dtype=np.bool_)
+    keys_chosen = key[chosen]
+    touching = np.zeros(len(key), dtype=np.bool_)
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
-            beside |= np.isin(key + dy * stride + dx, with_edge)
-    return beside
+            touching |= np.isin(key + dy * stride + dx, keys_chosen)
+    return touching
 
 
-def _refine(image: Image, pixels: _Cells, allowed: Floats) -> tuple[Floats, Floats]:
-    """Split cells until parents and children agree; return mean and error of each given pixel."""
+def _refine(image: Image, pixels: _Cells, allowed: Floats) -> _Estimate:
+    """Split cells until parents and children agree; return the estimate of each given pixel."""
     total = np.zeros_like(allowed)
     error = np.zeros_like(allowed)
-    owner = np.arange(len(pixels.pixel))
-    cells, estimate = pixels, _estimate(image, pixels, follow_edges=False)
+    mixed = np.zeros(len(allowed), dtype=np.bool_)
+    owner = np.arange(len(allowed))
+    cells, estimate = pixels, _estimate_all(image, pixels, follow_edges=False)
     for level in range(1, _LAST_SPLIT + 1):
         children = cells.split()
-        follow_edges = level >= _SPLITS_BESIDE_AN_EDGE
-        parts = [_estimate(image, chunk, follow_edges) for chunk in _chunks(children)]
-        below = _Estimate(
-            np.concatenate([part.mean for part in parts]),
-            np.concatenate([part.error for part in parts]),
-            np.concatenate([part.mixed for part in parts]),
-        )
+        below = _estimate_all(image, children, follow_edges=level >= _FIRST_SPLIT_TO_FOLLOW_EDGES)
         area = children.side**2
         sums = below.mean.reshape(len(owner), 4, -1).sum(axis=1) * area
         disagreement = np.abs(sums - estimate.mean * cells.side**2)
-        any_mixed = below.mixed.reshape(-1, 4).any(axis=1) | estimate.mixed
+        with_edge = below.mixed.reshape(-1, 4).any(axis=1) | estimate.mixed
         own_error = below.error.reshape(len(owner), 4, -1).sum(axis=1) * area
         # Smooth children state their own bound; for an edge, what the last split changed is the bound.
-        bound = np.where(any_mixed[:, None], np.maximum(disagreement, own_error), own_error)
+        bound = np.where(with_edge[:, None], np.maximum(disagreement, own_error), own_error)
         # A pixel's allowance is shared by the cells along an edge, of which there are about 1/side.
         done = (bound <= allowed[owner] * cells.side).all(axis=1)
-        if level <= _SPLITS_BESIDE_AN_EDGE:
-            done &= ~_beside(cells, any_mixed)
+        # The tip of an edge that is not settled yet may hide between the points of a cell beside it.
+        done &= ~_touching(cells, with_edge & ~done)
         if level == _LAST_SPLIT:
             done[:] = True
         np.add.at(total, owner[done], sums[done])
         np.add.at(error, owner[done], bound[done])
+        np.logical_or.at(mixed, owner, with_edge)
         if done.all():
             break
         keep = np.repeat(~done, 4)
         owner = np.repeat(owner, 4)[keep]
         cells = children.take(keep)
         estimate = _Estimate(below.mean[keep], below.error[keep], below.mixed[keep])
-    return total, error
+    return _Estimate(total, error, mixed)
+
+
+def _estimate_all(image: Image, cells: _Cells, follow_edges: bool) -> _Estimate:
+    """Like `_estimate`, for any number of cells."""
+    parts = [_estimate(image, chunk, follow_edges) for chunk in _chunks(cells)]
+    return _Estimate(
+        np.concatenate([part.mean for part in parts]),
+        np.concatenate([part.error for part in parts]),
+        np.concatenate([part.mixed for part in parts]),
+    )
 
 
 def _estimate(image: Image, cells: _Cells, follow_edges: bool) -> _Estimate:
@@ -194,51 +215,93 @@ def _estimate(image: Image, cells: _Cells, follow_edges: bool) -> _Estimate:
 def _two_pieces(
     image: Image, cells: _Cells, labels: Integers, values: Floats, sides_crossed: Booleans
 ) -> tuple[Floats, Floats]:
-    """Mean over cells cut by one edge, taken as the straight line between its two points on the cell's sides."""
+    """Mean over cells cut by one edge, through five of its points: two on the cell's sides and three between."""
     count = len(cells.pixel)
     corner_labels = labels[:, 13:]
     first_side = sides_crossed.argmax(axis=1)
     second_side = 3 - sides_crossed[:, ::-1].argmax(axis=1)
     everyone = np.arange(count)
+    outer_label, inner_label = corner_labels[everyone, first_side], corner_labels[everyone, first_side + 1]
 
-    def crossing(side: Integers) -> tuple[Floats, Floats]:
-        """Where the label changes along a side, by bisection, in the cell's own coordinates."""
-        after = (side + 1) % 4
-        x0, y0, x1, y1 = _CORNER_X[side], _CORNER_Y[side], _CORNER_X[after], _CORNER_Y[after]
-        label = corner_labels[everyone, side]
+    def at(x: Floats, y: Floats) -> tuple[Floats, Integers]:
+        """The image at positions in the cells' own coordinates."""
+        return image(cells.x + cells.side * np.clip(x, 0, 1), cells.y + cells.side * np.clip(y, 0, 1))
+
+    def boundary(label: Integers, x: Floats, y: Floats, dx: Floats, dy: Floats) -> Floats:
+        """How far one can go from (x, y), which has the label, along (dx, dy) until it ends: bisection in [0, 1]."""
         low, high = np.zeros(count), np.ones(count)
         for _ in range(_BISECTIONS):
             t = (low + high) / 2
-            _, here = image(cells.x + cells.side * (x0 + t * (x1 - x0)), cells.y + cells.side * (y0 + t * (y1 - y0)))
-            same = here == label
+            same = at(x + t * dx, y + t * dy)[1] == label
             low, high = np.where(same, t, low), np.where(same, high, t)
-        t = (low + high) / 2
-        return x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+        middle: Floats = (low + high) / 2
+        return middle
+
+    def crossing(side: Integers) -> tuple[Floats, Floats]:
+        """Where the label changes along a side."""
+        after = (side + 1) % 4
+        x, y = _CORNER_X[side], _CORNER_Y[side]
+        dx, dy = _CORNER_X[after] - x, _CORNER_Y[after] - y
+        t = boundary(corner_labels[everyone, side], x, y, dx, dy)
+        return x + t * dx, y + t * dy
 
     ax, ay = crossing(first_side)
     bx, by = crossing(second_side)
 
-    # The inner piece: first crossing, the corners between the two sides, second crossing. Shoelace formula.
-    px, py = ax, ay
-    inner_area = np.zeros(count)
-    for corner in range(1, 4):
-        inside = (corner > first_side) & (corner <= second_side)
-        qx, qy = np.where(inside, _CORNER_X[corner], px), np.where(inside, _CORNER_Y[corner], py)
-        inner_area += px * qy - qx * py
+    # The inner piece: first crossing, the corners between the two sides, second crossing. Its doubled area and moments
+    # by the shoelace formula, with the first crossing as origin.
+    doubled_area, moment_x, moment_y = np.zeros(count), np.zeros(count), np.zeros(count)
+    px, py = np.zeros(count), np.zeros(count)
+    for corner in range(1, 5):
+        if corner == 4:
+            qx, qy = bx - ax, by - ay
+        else:
+            inside = (corner > first_side) & (corner <= second_side)
+            qx, qy = np.where(inside, _CORNER_X[corner] - ax, px), np.where(inside, _CORNER_Y[corner] - ay, py)
+        cross = px * qy - qx * py
+        doubled_area += cross
+        moment_x += (px + qx) * cross
+        moment_y += (py + qy) * cross
         px, py = qx, qy
-    inner_area += px * by - bx * py + bx * ay - ax * by
-    inner_area = np.clip(np.abs(inner_area) / 2, 0, 1)
+    inner_area = np.clip(doubled_area / 2, 0, 1)
+    outer_area = 1 - inner_area
 
-    # Each piece has the mean of the points that carry its label; points of any third label are left out.
-    inner_label = corner_labels[everyone, first_side + 1]
-    outer_label = corner_labels[everyone, first_side]
-    means = []
-    for label in (inner_label, outer_label):
+    # A linear function has its mean at the centroid; the two centroids balance at the middle of the cell.
+    positive = np.where(doubled_area > 0, doubled_area, 1.0)
+    inner_x, inner_y = ax + moment_x / (3 * positive), ay + moment_y / (3 * positive)
+    rest = np.where(outer_area > 0, outer_area, 1.0)
+    outer_x, outer_y = (0.5 - inner_area * inner_x) / rest, (0.5 - inner_area * inner_y) / rest
+
+    # How far the edge bulges out of the inner piece at a quarter, half and three quarters of the chord, sought up to a
+    # quarter of its length to either side. Simpson's rule with half the points tells how good the one with all is.
+    chord_x, chord_y = bx - ax, by - ay
+    out_x, out_y = -chord_y / 4, chord_x / 4
+    bulges = []
+    measured = np.ones(count, dtype=np.bool_)
+    for part in (0.25, 0.5, 0.75):
+        x, y = ax + part * chord_x, ay + part * chord_y
+        measured &= at(x - out_x, y - out_y)[1] == inner_label
+        measured &= at(x + out_x, y + out_y)[1] != inner_label
+        t = boundary(inner_label, x - out_x, y - out_y, 2 * out_x, 2 * out_y)
+        bulges.append((2 * t - 1) / 4 * (chord_x**2 + chord_y**2))
+    coarse = 2 / 3 * bulges[1]
+    fine = (bulges[0] + bulges[1] / 2 + bulges[2]) / 3
+    inner_area = np.clip(inner_area + np.where(measured, fine, 0.0), 0, 1)
+    area_error = np.where(measured, np.abs(fine - coarse), 1.0)
+
+    mean = np.zeros((count, values.shape[2]))
+    for x, y, label, area in (
+        (inner_x, inner_y, inner_label, inner_area),
+        (outer_x, outer_y, outer_label, 1 - inner_area),
+    ):
+        there, label_there = at(x, y)
+        # Where the edge bends around the centroid, the points that carry the label do instead.
         own = (labels == label[:, None])[..., None]
-        means.append((values * own).sum(axis=1) / own.sum(axis=1))
-    mean = inner_area[:, None] * means[0] + (1 - inner_area)[:, None] * means[1]
-    # The parent's disagreement with its children bounds the rest; a third label is not measured at all.
-    third = (labels != inner_label[:, None]) & (labels != outer_label[:, None])
+        missed = label_there != label
+        mean += area[:, None] * np.where(missed[:, None], (values * own).sum(axis=1) / own.sum(axis=1), there)
+        area_error += np.where(missed, area, 0.0)
+    # A third label is not measured at all.
+    third = ((labels != inner_label[:, None]) & (labels != outer_label[:, None])).any(axis=1)
     spread = values.max(axis=1) - values.min(axis=1)
-    error: Floats = np.where(third.any(axis=1)[:, None], spread, 0.0)
+    error: Floats = np.where(third, 1.0, np.minimum(area_error, 1.0))[:, None] * spread
     return mean, error

@@ -1,0 +1,1 @@
+"""What is rendered: the scene model, canonical families with their expectations, exporters."""

@@ -19,6 +19,8 @@ from reference_scenes import model
 
 # A ray that starts on a surface must not meet it again; relative to the size of the coordinates involved.
 _RAY_EPSILON = 1e-9
+# Labels are hashed modulo 2^64, so that the states of any number of emitters fit into one.
+_MIX = 6364136223846793005
 
 
 class NoClosedForm(ValueError):
@@ -187,7 +189,9 @@ def require_closed_form(scene: model.Scene) -> None:
                 raise NoClosedForm(f"{where} and /objects/{k}/shape both reflect and may light each other")
 
     solids = [(f"/objects/{i}/shape", o.shape) for i, o in enumerate(scene.objects)]
-    solids += [(f"/emitters/{i}/shape", e.shape) for i, e in enumerate(scene.emitters) if isinstance(e, model.AreaEmitter)]
+    solids += [
+        (f"/emitters/{i}/shape", e.shape) for i, e in enumerate(scene.emitters) if isinstance(e, model.AreaEmitter)
+    ]
     for i, emitter in enumerate(scene.emitters):
         if not isinstance(emitter, model.AreaEmitter | model.ConstantEmitter):
             continue
@@ -258,22 +262,24 @@ def film_radiance(scene: model.Scene) -> pixels.Image:
         for index, light in enumerate(lights, start=len(scene.objects)):
             radiance[(surface == index) & front] = light.radiance
         # One integer from all of them; the face separates the triangles of a mesh.
-        label = (((face * (len(shapes) + 1) + surface + 1) * 2 + front) << 3 * len(scene.emitters)) + lighting
-        return radiance, label
+        seen_surface = (face * (len(shapes) + 1) + surface + 1) * 2 + front
+        return radiance, lighting * _MIX + seen_surface
 
     return image
 
 
 def _direct_light(scene: model.Scene, shapes: list[model.Shape], receivers: Receivers) -> tuple[Floats, Integers]:
-    """Irradiance (N, 3) of all emitters at receivers (N, 3), and bits that tell which of them are visible or cut."""
+    """Irradiance (N, 3) of all emitters at receivers (N, 3), and a label of which of them are visible or cut."""
     total = np.zeros((len(receivers.points), 3))
-    bits = np.zeros(len(receivers.points), dtype=np.int64)
+    label = np.zeros(len(receivers.points), dtype=np.int64)
     for emitter in scene.emitters:
         match emitter:
             case model.PointEmitter() | model.SpotEmitter():
                 towards = np.array(emitter.position) - receivers.points
                 visible = ~_occluded(shapes, receivers.points, towards, 1.0)
                 state = visible.astype(np.int64)
+                if isinstance(emitter, model.SpotEmitter):
+                    state += _cone_state(emitter, towards)
             case model.DirectionalEmitter():
                 towards = np.broadcast_to(-np.array(emitter.direction), receivers.points.shape)
                 visible = ~_occluded(shapes, receivers.points, towards, np.inf)
@@ -286,8 +292,8 @@ def _direct_light(scene: model.Scene, shapes: list[model.Shape], receivers: Rece
                 state = np.zeros(len(total), dtype=np.int64)
         light: Floats = sum((irradiance(part, receivers) for part in _oracle_emitters(emitter)), np.zeros(3))
         total += np.where(visible[:, None], light, 0.0)
-        bits = bits * 8 + state
-    return total, bits
+        label = label * _MIX + state
+    return total, label
 
 
 def _occluded(shapes: list[model.Shape], points: Floats, towards: Floats, t_max: float) -> Booleans:
@@ -299,17 +305,29 @@ def _occluded(shapes: list[model.Shape], points: Floats, towards: Floats, t_max:
     return blocked
 
 
+def _cone_state(emitter: model.SpotEmitter, towards: Floats) -> Integers:
+    """Whether a receiver lies within the beam and within the cone of a spot (2 and 4); the falloff has kinks there."""
+    axis = np.array(emitter.direction) / np.linalg.norm(emitter.direction)
+    cosine = -(towards @ axis) / np.linalg.norm(towards, axis=-1)
+    in_beam = cosine > np.cos(np.radians(emitter.beam_width))
+    in_cone = cosine > np.cos(np.radians(emitter.cutoff_angle))
+    state: Integers = 2 * in_beam.astype(np.int64) + 4 * in_cone.astype(np.int64)
+    return state
+
+
 def _cut_state(shape: model.Shape, receivers: Receivers) -> Integers:
     """How an area emitter meets the receiver's horizon, and the receiver its plane (3 bits).
 
     The irradiance has kinks where these change.
     """
     height = np.einsum("ni,ni->n", receivers.points, receivers.normals)
-    state = 2 * (_extent(shape, receivers.normals) > height) + (-_extent(shape, -receivers.normals) >= height)
+    above = (_extent(shape, receivers.normals) > height).astype(np.int64)
+    wholly_above = (-_extent(shape, -receivers.normals) >= height).astype(np.int64)
+    state: Integers = 2 * above + wholly_above
     plane = _plane_of(shape)
     if plane is not None:
         state = state + 4 * ((receivers.points - plane.point) @ plane.normal > 0)
-    return state.astype(np.int64)
+    return state
 
 
 # ----------------------------------------------------------------------------------------- the expectation
@@ -338,5 +356,3 @@ def closed_form(scene: model.Scene, formulas: tuple[str, ...] = ()) -> Expectati
         valid=np.ones(radiance.shape[:2], dtype=np.bool_),
         provenance=Provenance("closed form", formulas),
     )
-
-

@@ -33,13 +33,32 @@ def load_scene(path: Path) -> Scene:
 
 def load_json(path: Path, kind: type[M]) -> M:
     """Read a model from a JSON file; errors as for `load_scene`."""
+    text = _read(path)
     try:
-        data = json.loads(_read(path))
+        data = json.loads(text, object_pairs_hook=_without_repetition)
     except json.JSONDecodeError as error:
         raise InvalidFile(f"{path}: line {error.lineno}, column {error.colno}: not JSON: {error.msg}") from None
+    except _RepeatedKey as error:
+        raise InvalidFile(f"{path}: an object names the key {_shown(error.args[0])} twice") from None
     except RecursionError:
         raise InvalidFile(f"{path}: nested too deeply") from None
+    except ValueError:
+        # The only other complaint of the parser.
+        raise InvalidFile(f"{path}: not JSON: a number has too many digits") from None
     return validate(data, kind, str(path))
+
+
+class _RepeatedKey(ValueError):
+    """An object that names a key twice: one of the two values would be ignored."""
+
+
+def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in result:
+            raise _RepeatedKey(key)
+        result[key] = value
+    return result
 
 
 def load_toml(path: Path, kind: type[M]) -> M:
@@ -49,12 +68,16 @@ def load_toml(path: Path, kind: type[M]) -> M:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file as plain data; errors as for `load_scene`."""
+    text = _read(path)
     try:
-        return tomllib.loads(_read(path))
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InvalidFile(f"{path}: not TOML: {error}") from None
     except RecursionError:
         raise InvalidFile(f"{path}: nested too deeply") from None
+    except ValueError:
+        # A number with thousands of digits is TOML, but too much for Python.
+        raise InvalidFile(f"{path}: not TOML: a number has too many digits") from None
 
 
 def _read(path: Path) -> str:
@@ -91,23 +114,29 @@ def suggest(word: str, known: list[str]) -> str:
 
 def _explain(error: ErrorDetails, data: Any, kind: type[BaseModel]) -> str:
     pointer, parent = _pointer(error["loc"], data)
+    value = error["input"]
     match error["type"]:
         case "missing":
             return f"{pointer} is missing"
         case "extra_forbidden":
             key = str(error["loc"][-1])
-            allowed = sorted(_keys_at(error["loc"], data, kind))
+            allowed = sorted({alias for model in _models_at(error["loc"][:-1], data, kind) for alias in _keys(model)})
             return f"{pointer} is not a known key; {suggest(key, allowed)}"
         case "union_tag_invalid" | "union_tag_not_found":
-            tags = error.get("ctx", {}).get("expected_tags", "")
-            found = parent.get("type") if isinstance(parent, dict) else None
-            return f"{pointer}/type: {_shown(found)} is none of {tags or 'the known types'}"
+            tags = [model.model_fields["type"].default for model in _models_at(error["loc"], data, kind)]
+            if isinstance(parent, dict) and "type" not in parent:
+                return f"{pointer}/type is missing; known: {', '.join(tags)}"
+            found = parent["type"] if isinstance(parent, dict) else parent
+            meant = suggest(found if isinstance(found, str) else "", tags)
+            return f"{pointer}/type: {_shown(found)} is not a known type; {meant}"
+        case "model_type" | "model_attributes_type":
+            return f"{pointer}: {_shown(value)} is not an object"
         case "value_error":
             message = str(error["ctx"]["error"])
-            return f"{pointer}: {_shown(error['input'])} {message}" if _is_small(error["input"]) else f"{pointer}: {message}"
+            return f"{pointer}: {_shown(value)} {message}" if _is_small(value) else f"{pointer}: {message}"
         case _:
             message = error["msg"][0].lower() + error["msg"][1:]
-            return f"{pointer}: {_shown(error['input'])}: {message}"
+            return f"{pointer}: {_shown(value)}: {message}"
 
 
 def _pointer(location: tuple[int | str, ...], data: Any) -> tuple[str, Any]:
@@ -115,35 +144,33 @@ def _pointer(location: tuple[int | str, ...], data: Any) -> tuple[str, Any]:
     parts: list[str] = []
     current = data
     for index, part in enumerate(location):
-        last = index == len(location) - 1
-        if isinstance(current, dict) and part in current:
+        if _has(current, part):
             current = current[part]
-        elif isinstance(current, list | tuple) and isinstance(part, int) and part < len(current):
-            current = current[part]
-        elif not last:
+        elif index < len(location) - 1 or (isinstance(current, dict) and current.get("type") == part):
             continue
-        elif isinstance(current, dict) and current.get("type") == part:
-            continue
-        parts.append(str(part).replace("~", "~0").replace("/", "~1"))
+        parts.append(_printable(str(part)).replace("~", "~0").replace("/", "~1"))
     return "/" + "/".join(parts), current
 
 
-def _keys_at(location: tuple[int | str, ...], data: Any, kind: type[BaseModel]) -> set[str]:
-    """The keys that the model knows beside an unknown one."""
-    candidates: list[Any] = [kind]
-    current = data
-    for part in location[:-1]:
-        current = current[part] if isinstance(current, dict) and part in current else current
-        found: list[Any] = []
-        for candidate in candidates:
-            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
-                if isinstance(part, str) and part in candidate.model_fields:
-                    found += _models_in(candidate.model_fields[part].annotation)
-                else:
-                    found.append(candidate)
-        tagged = [c for c in found if "type" in c.model_fields and c.model_fields["type"].default == part]
-        candidates = tagged or found
-    return {field.alias or name for c in candidates for name, field in c.model_fields.items()}
+def _has(container: Any, part: int | str) -> bool:
+    if isinstance(container, list | tuple):
+        return isinstance(part, int) and part < len(container)
+    return isinstance(container, dict) and part in container
+
+
+def _models_at(location: tuple[int | str, ...], data: Any, kind: type[BaseModel]) -> list[type[BaseModel]]:
+    """The models that an object at a location may be: one, or those of a union whose member is not known."""
+    candidates = [kind]
+    for part in location:
+        fields = [model.model_fields[part] for model in candidates if part in model.model_fields]
+        tagged = [
+            model for model in candidates if "type" in model.model_fields and model.model_fields["type"].default == part
+        ]
+        if fields:
+            candidates = [model for field in fields for model in _models_in(field.annotation)]
+        elif tagged:
+            candidates = tagged
+    return candidates
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
@@ -152,11 +179,26 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     return [found for argument in get_args(annotation) for found in _models_in(argument)]
 
 
+def _keys(model: type[BaseModel]) -> set[str]:
+    return {field.alias or name for name, field in model.model_fields.items()}
+
+
 def _is_small(value: Any) -> bool:
-    return len(repr(value)) <= 80
+    try:
+        return len(repr(value)) <= 80
+    except RecursionError:
+        return False
 
 
 def _shown(value: Any) -> str:
     """A value in an error message: short, and on one line."""
-    text = json.dumps(value, default=repr, ensure_ascii=True) if not isinstance(value, float) else repr(value)
+    try:
+        text = json.dumps(value, default=repr, ensure_ascii=True) if not isinstance(value, float) else repr(value)
+    except RecursionError:
+        text = "(nested too deeply to be shown)"
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _printable(text: str) -> str:
+    """Text with line breaks, control characters and lone surrogates written as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode("ascii") for c in text)

@@ -17,10 +17,15 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Whatever is larger overflows in renderers of single precision, if not itself then its square.
+LARGEST = 1e18
+
+# Strict: neither text nor true and false are taken for numbers.
+Finite = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST, allow_inf_nan=False)]
+Index = Annotated[int, Field(strict=True)]
 Vector = tuple[Finite, Finite, Finite]
 
 
@@ -42,15 +47,21 @@ def _require_direction(value: tuple[float, float, float]) -> tuple[float, float,
     return value
 
 
+def _three_numbers(minimum: float, maximum: float) -> WithJsonSchema:
+    """What the JSON Schema says of a vector whose validator it cannot know."""
+    number = {"type": "number", "minimum": minimum, "maximum": maximum}
+    return WithJsonSchema({"type": "array", "prefixItems": [number] * 3, "minItems": 3, "maxItems": 3})
+
+
 Direction = Annotated[Vector, AfterValidator(_require_direction)]
-Spectrum = Annotated[Vector, AfterValidator(_require_non_negative)]
-Albedo = Annotated[Vector, AfterValidator(_require_albedo)]
+Spectrum = Annotated[Vector, AfterValidator(_require_non_negative), _three_numbers(0, LARGEST)]
+Albedo = Annotated[Vector, AfterValidator(_require_albedo), _three_numbers(0, 1)]
 
 
 class Model(BaseModel):
-    """Frozen data that refuses unknown keys and silent conversions."""
+    """Frozen data that refuses unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 # --------------------------------------------------------------------------------------------- shapes
@@ -68,7 +79,7 @@ class Rectangle(Model):
     def _edges_are_orthogonal(self) -> Self:
         u, v = np.array(self.half_u), np.array(self.half_v)
         if abs(float(u @ v)) > 1e-9 * float(np.linalg.norm(u) * np.linalg.norm(v)):
-            raise ValueError("half_u and half_v are not orthogonal; a rectangle has right angles (use a mesh otherwise)")
+            raise ValueError("half_u and half_v are not orthogonal; for other than right angles use a mesh")
         return self
 
 
@@ -94,7 +105,7 @@ class Mesh(Model):
 
     type: Literal["mesh"] = "mesh"
     vertices: Annotated[tuple[Vector, ...], Field(min_length=3)]
-    triangles: Annotated[tuple[tuple[int, int, int], ...], Field(min_length=1)]
+    triangles: Annotated[tuple[tuple[Index, Index, Index], ...], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _triangles_exist(self) -> Self:
@@ -163,8 +174,8 @@ class SpotEmitter(Model):
     position: Vector
     direction: Direction
     intensity: Spectrum
-    cutoff_angle: Annotated[float, Field(gt=0, lt=90)]
-    beam_width: Annotated[float, Field(gt=0, lt=90)]
+    cutoff_angle: Annotated[float, Field(strict=True, gt=0, lt=90)]
+    beam_width: Annotated[float, Field(strict=True, gt=0, lt=90)]
 
     @model_validator(mode="after")
     def _beam_inside_cone(self) -> Self:
@@ -203,7 +214,7 @@ class Camera(Model):
     origin: Vector
     target: Vector
     up: Direction = (0.0, 0.0, 1.0)
-    fov_x: Annotated[float, Field(gt=0, lt=180)]
+    fov_x: Annotated[float, Field(strict=True, gt=0, lt=180)]
 
     @model_validator(mode="after")
     def _axes_exist(self) -> Self:
@@ -227,7 +238,7 @@ class GaussianFilter(Model):
     """A pixel is a Gaussian average with this standard deviation [pixels], cut off at 4 of them."""
 
     type: Literal["gaussian"] = "gaussian"
-    stddev: Annotated[float, Field(gt=0, le=2)] = 0.5
+    stddev: Annotated[float, Field(strict=True, gt=0, le=2)] = 0.5
 
 
 Filter = Annotated[BoxFilter | GaussianFilter, Field(discriminator="type")]
@@ -236,8 +247,8 @@ Filter = Annotated[BoxFilter | GaussianFilter, Field(discriminator="type")]
 class Film(Model):
     """The pixel grid and its reconstruction filter."""
 
-    width: Annotated[int, Field(ge=1, le=16384)]
-    height: Annotated[int, Field(ge=1, le=16384)]
+    width: Annotated[int, Field(strict=True, ge=1, le=16384)]
+    height: Annotated[int, Field(strict=True, ge=1, le=16384)]
     filter: Filter = BoxFilter()
 
 

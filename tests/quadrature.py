@@ -8,6 +8,8 @@ The integrand has kinks where a cosine becomes 0. Every domain is therefore cut 
 functions are integrated and the results are good to about 1e-13 for flat lights and 1e-20 for spheres.
 """
 
+from itertools import pairwise
+
 import mpmath
 import numpy as np
 from scipy.integrate import cubature
@@ -131,7 +133,7 @@ def of_sphere(center, radius, point, normal):
     cosine depend on alpha alone; along each circle of the same alpha the height above the horizon is A + B cos(beta).
     """
     with mpmath.workdps(DIGITS):
-        center, point, normal = (mpmath.matrix([mpmath.mpf(float(x)) for x in vector]) for vector in (center, point, normal))
+        center, point, normal = (mpmath.matrix([float(x) for x in vector]) for vector in (center, point, normal))
         normal /= mpmath.norm(normal)
         radius = mpmath.mpf(float(radius))
         back = point - center
@@ -186,12 +188,14 @@ def of_environment():
     )
 
 
-def over_sphere(function):
-    """Integral over all unit vectors of a smooth function that takes them as (N, 3)."""
+def over_sphere(function, kinks=()):
+    """Integral over all unit vectors of a function that takes them as (N, 3), smooth between some polar angles."""
 
-    def integrand(z_and_phi):
-        z, phi = z_and_phi.T
-        sine = np.sqrt(1 - z**2)
-        return function(np.stack([sine * np.cos(phi), sine * np.sin(phi), z], axis=1))
+    def integrand(theta_and_phi):
+        theta, phi = theta_and_phi.T
+        sine = np.sin(theta)
+        return sine * function(np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=1))
 
-    return converged(integrand, [-1, 0], [1, 2 * np.pi])
+    return sum(
+        converged(integrand, [first, 0], [last, 2 * np.pi]) for first, last in pairwise([0.0, *sorted(kinks), np.pi])
+    )

@@ -37,7 +37,9 @@ def test_links_lead_somewhere(page):
 
 
 def test_the_example_scene_is_valid(tmp_path):
-    example = re.search(r"```json\n(.*?)```", (ROOT / "docs" / "scene-format.md").read_text(encoding="utf-8"), re.DOTALL)
+    example = re.search(
+        r"```json\n(.*?)```", (ROOT / "docs" / "scene-format.md").read_text(encoding="utf-8"), re.DOTALL
+    )
     (tmp_path / "scene.json").write_text(example[1], encoding="utf-8")
     assert isinstance(load_scene(tmp_path / "scene.json"), Scene)
 

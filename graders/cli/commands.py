@@ -31,7 +31,7 @@ def oracle() -> None:
     """
 
 
-@oracle.command()
+@oracle.command(short_help="Grade two right renderers and 16 wrong ones.")
 @click.option("--quick", is_flag=True, help="Four families only.")
 @click.option("--out", type=_PATH, default=Path("oracle-demo"), show_default=True, help="Folder for the results.")
 @_SEED
@@ -46,7 +46,7 @@ def demo(quick: bool, out: Path, seed: int, jobs: int) -> int:
     return EXIT_RIGHT if run_demo(quick, out, seed, jobs) else EXIT_WRONG
 
 
-@oracle.command()
+@oracle.command(short_help="Grade a submission.")
 @click.argument("path", type=_PATH)
 @click.option("--rubric", type=_PATH, help="Rubric file; the ten families of 'first-light' without it.")
 @click.option("--out", type=_PATH, default=Path("oracle-result"), show_default=True, help="Folder for the results.")
@@ -103,7 +103,7 @@ def list_scenes(as_json: bool) -> None:
     run_list(as_json)
 
 
-@scenes.command("show")
+@scenes.command("show", short_help="Show a family, and the member that a seed draws.")
 @click.argument("name")
 @_SEED
 @_JSON
@@ -127,7 +127,7 @@ def export_scenes(names: tuple[str, ...], every: bool, format_name: str, out: Pa
     run_export(names, every, format_name, out, seed)
 
 
-@scenes.command("validate")
+@scenes.command("validate", short_help="Check scene files in native JSON.")
 @click.argument("files", nargs=-1, required=True, type=_PATH)
 @_JSON
 def validate_scenes(files: tuple[Path, ...], as_json: bool) -> int:
@@ -137,7 +137,7 @@ def validate_scenes(files: tuple[Path, ...], as_json: bool) -> int:
     return EXIT_RIGHT if run_validate(files, as_json) else EXIT_WRONG
 
 
-@oracle.command()
+@oracle.command(short_help="Tell what this installation can do.")
 @_JSON
 def doctor(as_json: bool) -> int:
     """Tell what this installation can do, and how to mend what it cannot."""

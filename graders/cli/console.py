@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -26,8 +27,8 @@ _PLAIN_WIDTH = 400
 
 
 def output() -> Console:
-    """The console for results; without a terminal its lines are not folded."""
-    console = Console(highlight=False)
+    """The console for results; without a terminal its lines are not folded, and NO_COLOR means no escapes at all."""
+    console = Console(highlight=False, color_system=None if os.environ.get("NO_COLOR") else "auto")
     return console if console.is_terminal else Console(highlight=False, width=_PLAIN_WIDTH)
 
 

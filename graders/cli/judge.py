@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -21,21 +22,26 @@ from oracle.statistics import Verdict
 def run_judge(images: tuple[Path, ...], scene: str, seed: int, tolerance: float, encoding: str, as_json: bool) -> str:
     """Judge images of one scene and print what was found; return the verdict."""
     family = family_named(scene)
+    if math.isnan(tolerance):
+        raise UsageError("--tolerance nan is no number")
     wanted = CaseOfRubric(family=family.name, tolerance=tolerance)
     detectable = max(Rubric.model_fields["detectable_bias"].default, 4 * tolerance)
     rubric = Rubric(name="judge", tolerance=tolerance, detectable_bias=min(detectable, 1.0), cases=(wanted,))
     case = case_of(wanted, rubric, seed)
     film = case.scene.film
-    for path in images:
+    outputs = [path.suffix.lower().removeprefix(".") for path in images]
+    for path, output_format in zip(images, outputs, strict=True):
         if not path.exists():
             raise UsageError(f"{path}: no such file")
-        kind = path.suffix.lower().removeprefix(".")
-        if kind not in OUTPUTS:
-            raise UsageError(f"{path}: format {kind!r} is none of {', '.join(OUTPUTS)}")
-        if (kind == "png") != (encoding == "srgb"):
+        if output_format not in OUTPUTS:
+            raise UsageError(f"{path}: format {output_format!r} is none of {', '.join(OUTPUTS)}")
+        if (output_format == "png") != (encoding == "srgb"):
             raise UsageError(f"{path}: --encoding srgb is for PNG, which needs it, and for nothing else")
     try:
-        decoded = [read_image(path, path.suffix.lower().removeprefix("."), film.width, film.height) for path in images]
+        decoded = [
+            read_image(path, output_format, film.width, film.height)
+            for path, output_format in zip(images, outputs, strict=True)
+        ]
     except BadImage as error:
         if as_json:
             print(json.dumps({"verdict": Verdict.UNGRADABLE, "reason": str(error), "evidence": None}, indent=1))
@@ -43,7 +49,8 @@ def run_judge(images: tuple[Path, ...], scene: str, seed: int, tolerance: float,
             print(f"oracle: ungradable: {error}", file=sys.stderr)
         return Verdict.UNGRADABLE
 
-    evidence = judge_images(case, decoded, encoding)
+    # Of several formats, the coarsest says how exact the images can be.
+    evidence = judge_images(case, decoded, "hdr" if "hdr" in outputs else outputs[0])
     reason, data = wording.reason(evidence), EvidenceResult.of(evidence)
     if as_json:
         document = {"verdict": evidence.verdict, "reason": reason, "evidence": data.model_dump(mode="json")}

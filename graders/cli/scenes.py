@@ -92,5 +92,6 @@ def run_validate(files: tuple[Path, ...], as_json: bool) -> bool:
             if document["error"]:
                 print(f"oracle: {document['error']}", file=sys.stderr)
             else:
-                print(f"{document['file']}: valid" + (f"; no closed form: {document['hint']}" if document["hint"] else ""))
+                hint = f"; no closed form: {document['hint']}" if document["hint"] else ""
+                print(f"{document['file']}: valid{hint}")
     return all(document["valid"] for document in documents)

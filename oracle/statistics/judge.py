@@ -45,8 +45,8 @@ _LOST = 1e-6
 # Standard errors by which a Monte Carlo expectation widens the interval of right values (union over 1e6 pixels).
 _EXPECTATION_ERRORS = 7.0
 _CONFIDENCE = 0.99
-# Evidence in all channels together is preferred to that in one if its logarithm is at least this part of it.
-_NEARLY = 0.9
+# Where the evidence is: a place is as good as another if the logarithm of its wealth is this part of the other's.
+_NEARLY = 0.75
 # Two images that differ by less than this fraction of their mean radiance are one.
 _SAME_IMAGE = 1e-5
 
@@ -374,11 +374,12 @@ def _ratios(null: _Null, observed: Floats, pixels_independent: bool) -> dict[str
 
 
 def _place(null: _Null, observed: Floats, wealth: list[_Wealth]) -> Place:
-    """The box in which some suspicion has grown richest, of all channels together if they say nearly as much."""
-    best = max(wealth, key=lambda w: float(w.logs.max()))
-    logs = best.logs
-    if logs[:, 0].max() >= _NEARLY * logs.max():
-        logs = logs[:, :1]
+    """The smallest box in which some suspicion has grown nearly as rich as any has."""
+    richest = max(float(w.logs.max()) for w in wealth)
+    by_size = sorted(wealth, key=lambda w: int(((w.scale.x1 - w.scale.x0) * (w.scale.y1 - w.scale.y0)).max()))
+    best = next(w for w in by_size if w.logs.max() >= _NEARLY * richest)
+    # All channels together are preferred to one in the same way.
+    logs = best.logs[:, :1] if best.logs[:, 0].max() >= _NEARLY * best.logs.max() else best.logs
     _, p, box = np.unravel_index(int(logs.argmax()), logs.shape)
     scale = best.scale
     x0, x1, y0, y1 = (int(bound[box]) for bound in (scale.x0, scale.x1, scale.y0, scale.y1))

@@ -91,7 +91,8 @@ def power(
             mean, variance_of_gain = growth(bias)
             return bool((mean - _QUANTILE * np.sqrt(variance_of_gain) >= threshold).any())
 
-        candidates = _BIASES[(_BIASES > tolerance) & ((sign > 0) | (_BIASES < 1))]
+        largest = np.inf if sign > 0 else 1.0
+        candidates = _BIASES[(tolerance < _BIASES) & (largest > _BIASES)]
         # Power grows with the bias, so that bisection finds the smallest.
         smallest = bisect_left(candidates, True, key=lambda bias: is_found(float(bias)))
         found.append(float(candidates[smallest]) if smallest < len(candidates) else None)

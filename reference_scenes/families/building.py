@@ -39,19 +39,33 @@ def draw_view(rng: np.random.Generator, elevation: tuple[float, float], distance
 
 
 def camera(view: View, target: Floats) -> model.Camera:
-    """The camera of a view of `target`, z up before it is rolled."""
-    towards_camera = direction(90 - view.elevation, view.azimuth)
-    forward = -towards_camera
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    roll = np.radians(view.roll)
+    """The camera of a view of `target`."""
+    towards_camera, _, up = _axes(view)
     return model.Camera(
         origin=vector(target + view.distance * towards_camera),
         target=vector(target),
-        up=vector(np.cos(roll) * up + np.sin(roll) * right),
+        up=vector(up),
         fov_x=view.fov_x,
     )
+
+
+def beside(view: View, right: float, up: float) -> Floats:
+    """A point off the origin by some metres to the right and upwards in the image.
+
+    A camera that looks there sees no scene around the origin symmetrically, so that a flipped image shows.
+    """
+    _, image_right, image_up = _axes(view)
+    return right * image_right + up * image_up
+
+
+def _axes(view: View) -> tuple[Floats, Floats, Floats]:
+    """Unit vectors towards the camera, to the right and upwards in the image; up is z before the camera is rolled."""
+    towards_camera = direction(90 - view.elevation, view.azimuth)
+    right = np.cross([0.0, 0.0, 1.0], towards_camera)
+    right /= np.linalg.norm(right)
+    up = np.cross(towards_camera, right)
+    roll = np.radians(view.roll)
+    return towards_camera, np.cos(roll) * right - np.sin(roll) * up, np.cos(roll) * up + np.sin(roll) * right
 
 
 def direction(polar: float, azimuth: float) -> Floats:
@@ -86,9 +100,11 @@ def floor(reflectance: model.Vector, spin: float, half_size: float = 40.0) -> mo
     return receiver(rectangle(np.zeros(3), np.array([0.0, 0.0, 1.0]), half_size, half_size, spin), reflectance)
 
 
-def draw_albedo(rng: np.random.Generator) -> model.Vector:
-    """Reflectances that differ between the channels."""
-    return (uniform(rng, 0.2, 0.9), uniform(rng, 0.2, 0.9), uniform(rng, 0.2, 0.9))
+def draw_albedo(rng: np.random.Generator, emission: model.Vector) -> model.Vector:
+    """Reflectances in the order of the emission, so that one cannot undo the difference between its channels."""
+    levels = sorted(uniform(rng, 0.2, 0.9) for _ in range(3))
+    red, green, blue = (levels[rank] for rank in np.argsort(np.argsort(emission)))
+    return (red, green, blue)
 
 
 def draw_colour(rng: np.random.Generator, scale: float) -> model.Vector:

@@ -39,8 +39,8 @@ def _draw_rectangle_overhead(rng: np.random.Generator) -> RectangleOverheadParam
         tilt=uniform(rng, 5, 25),
         tilt_azimuth=uniform(rng, 0, 360),
         spin=uniform(rng, 0, 90),
-        radiance=building.draw_colour(rng, 6),
-        reflectance=building.draw_albedo(rng),
+        radiance=(radiance := building.draw_colour(rng, 6)),
+        reflectance=building.draw_albedo(rng, radiance),
         view=building.draw_view(rng, (25, 35), (3.5, 4.5)),
     )
 
@@ -56,7 +56,7 @@ def _build_rectangle_overhead(p: RectangleOverheadParameters) -> model.Scene:
     return model.Scene(
         objects=(building.floor(p.reflectance, p.spin),),
         emitters=(model.AreaEmitter(shape=shape, radiance=p.radiance),),
-        camera=building.camera(p.view, np.zeros(3)),
+        camera=building.camera(p.view, building.beside(p.view, 0.3 * p.height, 0)),
         film=building.FILM,
     )
 
@@ -101,8 +101,8 @@ def _draw_rectangle_horizon(rng: np.random.Generator) -> RectangleHorizonParamet
         turn=turn,
         lean=uniform(rng, 5, 15),
         azimuth=uniform(rng, 0, 360),
-        radiance=building.draw_colour(rng, 10),
-        reflectance=building.draw_albedo(rng),
+        radiance=(radiance := building.draw_colour(rng, 10)),
+        reflectance=building.draw_albedo(rng, radiance),
         view=building.draw_view(rng, (50, 65), (4.0, 5.0)),
     )
 
@@ -167,8 +167,8 @@ def _draw_disk(rng: np.random.Generator) -> DiskParameters:
         tilt=uniform(rng, 10, 45),
         tilt_azimuth=uniform(rng, 0, 360),
         spin=uniform(rng, 0, 90),
-        radiance=building.draw_colour(rng, 8),
-        reflectance=building.draw_albedo(rng),
+        radiance=(radiance := building.draw_colour(rng, 8)),
+        reflectance=building.draw_albedo(rng, radiance),
         view=building.draw_view(rng, (25, 35), (3.5, 4.5)),
     )
 
@@ -218,8 +218,8 @@ def _draw_sphere(rng: np.random.Generator) -> SphereParameters:
         height=uniform(rng, 0.9, 1.4),
         radius=uniform(rng, 0.2, 0.45),
         spin=uniform(rng, 0, 90),
-        radiance=building.draw_colour(rng, 6),
-        reflectance=building.draw_albedo(rng),
+        radiance=(radiance := building.draw_colour(rng, 6)),
+        reflectance=building.draw_albedo(rng, radiance),
         view=building.draw_view(rng, (25, 35), (3.0, 4.0)),
     )
 
@@ -229,7 +229,7 @@ def _build_sphere(p: SphereParameters) -> model.Scene:
     return model.Scene(
         objects=(building.floor(p.reflectance, p.spin),),
         emitters=(model.AreaEmitter(shape=shape, radiance=p.radiance),),
-        camera=building.camera(p.view, np.zeros(3)),
+        camera=building.camera(p.view, building.beside(p.view, 0.3 * p.height, 0)),
         film=building.FILM,
     )
 
@@ -272,9 +272,9 @@ def _draw_two_lights(rng: np.random.Generator) -> TwoLightsParameters:
         half_width=uniform(rng, 0.2, 0.4),
         half_height=uniform(rng, 0.15, 0.3),
         radius=uniform(rng, 0.15, 0.35),
-        rectangle_radiance=building.draw_colour(rng, 9),
+        rectangle_radiance=(rectangle_radiance := building.draw_colour(rng, 9)),
         disk_radiance=building.draw_colour(rng, 9),
-        reflectance=building.draw_albedo(rng),
+        reflectance=building.draw_albedo(rng, rectangle_radiance),
         view=building.draw_view(rng, (25, 35), (3.5, 4.5)),
     )
 
@@ -334,15 +334,17 @@ def _build_furnace(p: FurnaceParameters) -> model.Scene:
     return model.Scene(
         objects=(building.receiver(shape, p.reflectance),),
         emitters=(model.ConstantEmitter(radiance=(1.0, 1.0, 1.0)),),
-        # Off centre, so that the image is not symmetric.
-        camera=building.camera(p.view, 0.4 * p.radius * building.direction(60, p.view.azimuth + 70)),
+        camera=building.camera(p.view, building.beside(p.view, 0.3 * p.radius, 0.25 * p.radius)),
         film=building.FILM,
     )
 
 
 FURNACE = Family(
     name="furnace",
-    law="In light of radiance 1 from everywhere a diffuse surface shows its reflectance: white vanishes, none exceeds 1.",
+    law=(
+        "In light of radiance 1 from everywhere a diffuse surface shows its reflectance: "
+        "white vanishes, none exceeds 1."
+    ),
     concept="reflection integral; white furnace test: a white diffuse BRDF is 1/pi",
     formula="L = integral of rho/pi * 1 * cos(theta) d-omega = rho",
     source="Heitz 2014, section 5.1 (white furnace test); Pharr, Jakob and Humphreys 2023, section 9.2",

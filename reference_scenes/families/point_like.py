@@ -29,8 +29,8 @@ def _draw_point_distance(rng: np.random.Generator) -> PointDistanceParameters:
     height = uniform(rng, 0.5, 2.0)
     return PointDistanceParameters(
         height=height,
-        intensity=building.draw_colour(rng, 4 * height**2),
-        reflectance=building.draw_albedo(rng),
+        intensity=(intensity := building.draw_colour(rng, 4 * height**2)),
+        reflectance=building.draw_albedo(rng, intensity),
         spin=uniform(rng, 0, 90),
         view=building.draw_view(rng, (35, 60), (2.5, 4.5)),
     )
@@ -41,7 +41,7 @@ def _build_point_distance(p: PointDistanceParameters) -> model.Scene:
         objects=(building.floor(p.reflectance, p.spin),),
         emitters=(model.PointEmitter(position=(0.0, 0.0, p.height), intensity=p.intensity),),
         # Off centre, so that near and far parts of the floor are seen.
-        camera=building.camera(p.view, np.array([0.3, 0.5, 0.0]) * p.height),
+        camera=building.camera(p.view, building.beside(p.view, 0.4 * p.height, 0.3 * p.height)),
         film=building.FILM,
     )
 
@@ -82,8 +82,8 @@ def _draw_point_angle(rng: np.random.Generator) -> PointAngleParameters:
         incidence=uniform(rng, 45, 75),
         incidence_azimuth=uniform(rng, 0, 360),
         distance=distance,
-        intensity=building.draw_colour(rng, 8 * distance**2),
-        reflectance=building.draw_albedo(rng),
+        intensity=(intensity := building.draw_colour(rng, 8 * distance**2)),
+        reflectance=building.draw_albedo(rng, intensity),
         view=building.draw_view(rng, (45, 55), (3.5, 4.5)),
     )
 
@@ -138,8 +138,8 @@ def _draw_directional(rng: np.random.Generator) -> DirectionalParameters:
         tilt_azimuth=uniform(rng, 0, 360),
         incidence=uniform(rng, 25, 75),
         incidence_azimuth=uniform(rng, 0, 360),
-        irradiance=building.draw_colour(rng, 4),
-        reflectance=building.draw_albedo(rng),
+        irradiance=(irradiance := building.draw_colour(rng, 4)),
+        reflectance=building.draw_albedo(rng, irradiance),
         view=building.draw_view(rng, (45, 55), (3.5, 4.5)),
     )
 
@@ -148,9 +148,7 @@ def _build_directional(p: DirectionalParameters) -> model.Scene:
     normal = building.direction(p.tilt, p.tilt_azimuth)
     u, v = building.tangents(normal, p.incidence_azimuth)
     theta = np.radians(p.incidence)
-    shape = model.Rectangle(
-        center=(0.0, 0.0, 0.0), half_u=building.vector(1.1 * u), half_v=building.vector(0.8 * v)
-    )
+    shape = model.Rectangle(center=(0.0, 0.0, 0.0), half_u=building.vector(1.1 * u), half_v=building.vector(0.8 * v))
     return model.Scene(
         objects=(building.receiver(shape, p.reflectance),),
         emitters=(
@@ -205,8 +203,8 @@ def _draw_hard_shadow(rng: np.random.Generator) -> HardShadowParameters:
         occluder_size=uniform(rng, 0.25, 0.4),
         occluder_tilt=uniform(rng, 0, 30),
         spin=uniform(rng, 0, 360),
-        intensity=building.draw_colour(rng, 4 * height**2),
-        reflectance=building.draw_albedo(rng),
+        intensity=(intensity := building.draw_colour(rng, 4 * height**2)),
+        reflectance=building.draw_albedo(rng, intensity),
         view=building.draw_view(rng, (35, 50), (3.0, 4.0)),
     )
 
@@ -226,7 +224,7 @@ def _build_hard_shadow(p: HardShadowParameters) -> model.Scene:
     return model.Scene(
         objects=(building.floor(p.reflectance, p.spin), building.receiver(shape, (0.0, 0.0, 0.0))),
         emitters=(model.PointEmitter(position=building.vector(light), intensity=p.intensity),),
-        camera=building.camera(p.view, np.zeros(3)),
+        camera=building.camera(p.view, building.beside(p.view, 0.3, 0.1)),
         film=building.FILM,
     )
 
