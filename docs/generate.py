@@ -38,8 +38,8 @@ def _families() -> str:
         "# Families",
         "",
         "Each canonical scene is a family: a seed draws one member, with its camera, sizes, colours and positions. The",
-        "same seed gives the same member everywhere. All expectations are closed forms, exact for any number of bounces,",
-        "since nothing but the receiver reflects. `oracle scenes show NAME --seed N` prints what a seed draws.",
+        "same seed gives the same member everywhere. All expectations are closed forms, exact for any number of",
+        "bounces, as nothing but the receiver reflects. `oracle scenes show NAME --seed N` prints what a seed draws.",
     ]
     for family in FAMILIES.values():
         document = (family.parameters.__doc__ or "").strip()
