@@ -171,17 +171,16 @@ class Tail:
         self._thread.start()
 
     def _read(self) -> None:
-        with contextlib.suppress(OSError, ValueError):
+        # A process that left the group may hold the pipe for long, so that only this thread knows when to close it.
+        with self._pipe, contextlib.suppress(OSError, ValueError):
             while chunk := os.read(self._pipe.fileno(), 65536):
                 self._is_cut |= len(self._kept) + len(chunk) > _KEPT_BYTES
                 self._kept = (self._kept + chunk)[-_KEPT_BYTES:]
 
     def text(self) -> str:
         """What was printed last, made harmless."""
-        # A process that left the group may hold the pipe; what has arrived by now is enough.
+        # What has arrived by now is enough.
         self._thread.join(1.0)
-        if not self._thread.is_alive():
-            self._pipe.close()
         kept = self._kept
         # Half a line says nothing, and may begin within a character or an escape sequence.
         return printable(kept.partition(b"\n")[2] or kept if self._is_cut else kept)
