@@ -19,6 +19,9 @@ from reference_scenes import model
 
 # A ray that starts on a surface must not meet it again; relative to the size of the coordinates involved.
 _RAY_EPSILON = 1e-9
+# A pixel whose integral is known less well than this, relative to its radiance or the image's, is not judged: the
+# error has to stay well below any sensible tolerance.
+_WORST_ERROR = 5e-4
 # Labels are hashed modulo 2^64, so that the states of any number of emitters fit into one.
 _MIX = 6364136223846793005
 
@@ -349,10 +352,11 @@ def closed_form(scene: model.Scene, formulas: tuple[str, ...] = ()) -> Expectati
         As `require_closed_form`.
     """
     radiance, error = pixels.average(film_radiance(scene), scene.film.width, scene.film.height)
+    known = error <= _WORST_ERROR * np.maximum(radiance, radiance.mean(axis=(0, 1)))
     return Expectation(
         radiance=radiance,
         standard_error=np.zeros_like(radiance),
         error_bound=error,
-        valid=np.ones(radiance.shape[:2], dtype=np.bool_),
+        valid=known.all(axis=2),
         provenance=Provenance("closed form", formulas),
     )
