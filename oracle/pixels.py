@@ -226,12 +226,15 @@ def _two_pieces(
     outer_label, inner_label = corner_labels[everyone, first_side], corner_labels[everyone, first_side + 1]
 
     def at(x: Floats, y: Floats) -> tuple[Floats, Integers]:
-        """The image at positions in the cells' own coordinates."""
-        return image(cells.x + cells.side * np.clip(x, 0, 1), cells.y + cells.side * np.clip(y, 0, 1))
+        """The image at positions (..., cells) in the cells' own coordinates."""
+        there, label_there = image(
+            (cells.x + cells.side * np.clip(x, 0, 1)).ravel(), (cells.y + cells.side * np.clip(y, 0, 1)).ravel()
+        )
+        return there.reshape(*x.shape, -1), label_there.reshape(x.shape)
 
     def boundary(label: Integers, x: Floats, y: Floats, dx: Floats, dy: Floats) -> Floats:
         """How far one can go from (x, y), which has the label, along (dx, dy) until it ends: bisection in [0, 1]."""
-        low, high = np.zeros(count), np.ones(count)
+        low, high = np.zeros(x.shape), np.ones(x.shape)
         for _ in range(_BISECTIONS):
             t = (low + high) / 2
             same = at(x + t * dx, y + t * dy)[1] == label
@@ -239,16 +242,12 @@ def _two_pieces(
         middle: Floats = (low + high) / 2
         return middle
 
-    def crossing(side: Integers) -> tuple[Floats, Floats]:
-        """Where the label changes along a side."""
-        after = (side + 1) % 4
-        x, y = _CORNER_X[side], _CORNER_Y[side]
-        dx, dy = _CORNER_X[after] - x, _CORNER_Y[after] - y
-        t = boundary(corner_labels[everyone, side], x, y, dx, dy)
-        return x + t * dx, y + t * dy
-
-    ax, ay = crossing(first_side)
-    bx, by = crossing(second_side)
+    # Where the label changes along the two sides.
+    sides = np.stack([first_side, second_side])
+    x, y = _CORNER_X[sides], _CORNER_Y[sides]
+    dx, dy = _CORNER_X[(sides + 1) % 4] - x, _CORNER_Y[(sides + 1) % 4] - y
+    t = boundary(corner_labels[everyone, sides], x, y, dx, dy)
+    (ax, bx), (ay, by) = x + t * dx, y + t * dy
 
     # The inner piece: first crossing, the corners between the two sides, second crossing. Its doubled area and moments
     # by the shoelace formula, with the first crossing as origin.
@@ -278,30 +277,26 @@ def _two_pieces(
     # quarter of its length to either side. Simpson's rule with half the points tells how good the one with all is.
     chord_x, chord_y = bx - ax, by - ay
     out_x, out_y = -chord_y / 4, chord_x / 4
-    bulges = []
-    measured = np.ones(count, dtype=np.bool_)
-    for part in (0.25, 0.5, 0.75):
-        x, y = ax + part * chord_x, ay + part * chord_y
-        measured &= at(x - out_x, y - out_y)[1] == inner_label
-        measured &= at(x + out_x, y + out_y)[1] != inner_label
-        t = boundary(inner_label, x - out_x, y - out_y, 2 * out_x, 2 * out_y)
-        bulges.append((2 * t - 1) / 4 * (chord_x**2 + chord_y**2))
+    parts = np.array([[0.25], [0.5], [0.75]])
+    x, y = ax + parts * chord_x, ay + parts * chord_y
+    measured = (at(x - out_x, y - out_y)[1] == inner_label).all(axis=0)
+    measured &= (at(x + out_x, y + out_y)[1] != inner_label).all(axis=0)
+    t = boundary(inner_label, x - out_x, y - out_y, 2 * out_x, 2 * out_y)
+    bulges = (2 * t - 1) / 4 * (chord_x**2 + chord_y**2)
     coarse = 2 / 3 * bulges[1]
     fine = (bulges[0] + bulges[1] / 2 + bulges[2]) / 3
     inner_area = np.clip(inner_area + np.where(measured, fine, 0.0), 0, 1)
     area_error = np.where(measured, np.abs(fine - coarse), 1.0)
 
-    mean = np.zeros((count, values.shape[2]))
-    for x, y, label, area in (
-        (inner_x, inner_y, inner_label, inner_area),
-        (outer_x, outer_y, outer_label, 1 - inner_area),
-    ):
-        there, label_there = at(x, y)
-        # Where the edge bends around the centroid, the points that carry the label do instead.
-        own = (labels == label[:, None])[..., None]
-        missed = label_there != label
-        mean += area[:, None] * np.where(missed[:, None], (values * own).sum(axis=1) / own.sum(axis=1), there)
-        area_error += np.where(missed, area, 0.0)
+    pieces = np.stack([inner_label, outer_label])
+    areas = np.stack([inner_area, 1 - inner_area])
+    there, label_there = at(np.stack([inner_x, outer_x]), np.stack([inner_y, outer_y]))
+    # Where the edge bends around a centroid, the points that carry the label do instead.
+    own = (labels == pieces[..., None])[..., None]
+    missed = label_there != pieces
+    of_points = (values * own).sum(axis=2) / own.sum(axis=2)
+    mean = (areas[..., None] * np.where(missed[..., None], of_points, there)).sum(axis=0)
+    area_error += np.where(missed, areas, 0.0).sum(axis=0)
     # A third label is not measured at all.
     third = ((labels != inner_label[:, None]) & (labels != outer_label[:, None])).any(axis=1)
     spread = values.max(axis=1) - values.min(axis=1)

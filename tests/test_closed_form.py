@@ -1,7 +1,6 @@
 """Expected images against hand computation, Embree and Mitsuba 3, and the refusal of scenes without a closed form."""
 
 import json
-from functools import cache
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from hypothesis import strategies as st
 from quadrature import unit
 from scipy import stats
 
+from oracle import pixels
 from oracle.emitters import Disk, Polygon, Receivers, Sphere, Spot
 from oracle.irradiance import irradiance
 from reference_scenes import model
@@ -17,7 +17,7 @@ from reference_scenes.closed_form import NoClosedForm, camera_rays, closed_form,
 from reference_scenes.export import export
 from reference_scenes.families import FAMILIES
 
-quick = settings(derandomize=True, deadline=None, max_examples=60)
+quick = settings(derandomize=True, deadline=None, max_examples=20)
 
 WHITE = model.Diffuse(reflectance=(1.0, 1.0, 1.0))
 GREY = model.Diffuse(reflectance=(0.6, 0.4, 0.2))
@@ -101,11 +101,11 @@ def test_a_mesh_is_seen_where_embree_sees_it():
     from oracle.tracer import RayCaster
 
     rng = np.random.default_rng(4)
-    vertices = rng.uniform(-1.2, 1.2, (24, 3))
-    triangles = rng.permutation(24).reshape(-1, 3)
+    vertices = rng.uniform(-1.2, 1.2, (15, 3))
+    triangles = rng.permutation(15).reshape(-1, 3)
     mesh = model.Mesh(vertices=tuple(map(tuple, vertices.tolist())), triangles=tuple(map(tuple, triangles.tolist())))
     camera = model.Camera(origin=(2.0, 3.0, 1.5), target=(0.1, 0.0, 0.2), up=(0.1, 0.2, 1.0), fov_x=50.0)
-    width, height, per_axis = 24, 16, 16
+    width, height, per_axis = 18, 12, 16
     image = closed_form(
         scene(SKY, model.Object(shape=mesh, material=BLACK), camera=camera, width=width, height=height)
     ).radiance
@@ -123,7 +123,7 @@ def test_a_mesh_is_seen_where_embree_sees_it():
         RayCaster(vertices, triangles).closest_hit(np.broadcast_to(camera.origin, directions.shape), directions)[1] >= 0
     )
     covered = hit.reshape(height, per_axis, width, per_axis).mean(axis=(1, 3))
-    assert 0.2 < covered.mean() < 0.8
+    assert 0.1 < covered.mean() < 0.8
     # An edge through a pixel moves its count by about one row of 16 rays at worst.
     np.testing.assert_allclose(image[..., 0] / RGB[0], 1 - covered, atol=0.06)
     np.testing.assert_allclose(image[..., 0].mean() / RGB[0], 1 - covered.mean(), atol=2e-3)
@@ -146,7 +146,9 @@ X, Y = (axis.ravel() for axis in np.meshgrid(np.linspace(0.1, 11.9, 9), np.linsp
     [
         (lamp(5.0), Polygon([[-0.5, 0.5, 5], [0.5, 0.5, 5], [0.5, -0.5, 5], [-0.5, -0.5, 5]], RGB)),
         (
-            model.AreaEmitter(shape=model.Disk(center=(1.0, 0.5, 5.0), normal=(0.0, 0.3, -1.0), radius=0.7), radiance=RGB),
+            model.AreaEmitter(
+                shape=model.Disk(center=(1.0, 0.5, 5.0), normal=(0.0, 0.3, -1.0), radius=0.7), radiance=RGB
+            ),
             Disk([1, 0.5, 5], [0, 0.3, -1], 0.7, RGB),
         ),
         (
@@ -178,10 +180,9 @@ def test_a_point_lights_a_floor_by_hand():
 
 
 def test_lights_add_up():
-    # The camera looks up through nothing: the lamp is above it.
-    lights = [lamp(5.0), POINT, model.DirectionalEmitter(direction=(0.3, 0.1, -1.0), irradiance=(1.0, 3.0, 2.0))]
-    alone = [closed_form(scene(floor(), light)).radiance for light in lights[1:]]
-    np.testing.assert_allclose(closed_form(scene(floor(), *lights[1:])).radiance, sum(alone), rtol=1e-9)
+    lights = [POINT, SKY, model.DirectionalEmitter(direction=(0.3, 0.1, -1.0), irradiance=(1.0, 3.0, 2.0))]
+    alone = [film_radiance(scene(floor(), light))(X, Y)[0] for light in lights]
+    np.testing.assert_allclose(film_radiance(scene(floor(), *lights))(X, Y)[0], sum(alone), rtol=1e-14)
 
 
 def test_front_sides_alone_reflect_and_shine():
@@ -190,7 +191,7 @@ def test_front_sides_alone_reflect_and_shine():
     # From above one sees the back of a lamp that faces down.
     assert not closed_form(scene(lamp(1.0))).radiance.any()
     facing_up = model.AreaEmitter(shape=rectangle((0.0, 0.0, 1.0), (9.0, 0.0, 0.0), (0.0, 9.0, 0.0)), radiance=RGB)
-    np.testing.assert_array_equal(closed_form(scene(facing_up)).radiance, np.broadcast_to(RGB, (8, 12, 3)))
+    np.testing.assert_allclose(closed_form(scene(facing_up)).radiance, np.broadcast_to(RGB, (8, 12, 3)), rtol=1e-15)
 
 
 def test_the_nearest_surface_is_seen():
@@ -203,7 +204,8 @@ def test_the_nearest_surface_is_seen():
 
 def test_an_empty_scene_is_black_and_one_with_a_sky_shows_it():
     assert not closed_form(scene()).radiance.any()
-    np.testing.assert_array_equal(closed_form(scene(SKY, SKY)).radiance, np.broadcast_to(RGB, (8, 12, 3)) * 2)
+    both = closed_form(scene(SKY, SKY)).radiance
+    np.testing.assert_allclose(both, np.broadcast_to(RGB, (8, 12, 3)) * 2, rtol=1e-15)
 
 
 def test_the_expectation_says_how_it_was_computed():
@@ -229,30 +231,39 @@ def test_a_pixel_is_the_mean_over_its_square():
     np.testing.assert_allclose(image.mean(axis=(0, 1)), sampled.mean(axis=(0, 1)), rtol=2e-4)
 
 
-@pytest.mark.parametrize("count", [1, 25, 40])
-def test_shadows_of_any_number_of_lights_are_told_apart(count):
-    # More lights than fit into the bits of a label: each casts a shadow of its own.
-    positions = [(2.5 * np.cos(a), 2.0 * np.sin(a), 2.0) for a in np.linspace(0, 6, count)]
-    lights = [model.PointEmitter(position=p, intensity=(1.0 / count,) * 3) for p in positions]
-    parts = scene(floor(), ball((0.0, 0.0, 0.5), 0.2), *lights)
-    image = closed_form(parts).radiance
-    per_axis = 48
-    x, y = np.meshgrid(*((np.arange(n * per_axis) + 0.5) / per_axis for n in (12, 8)))
-    sampled = film_radiance(parts)(x.ravel(), y.ravel())[0].reshape(8, per_axis, 12, per_axis, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(image, sampled, atol=4e-3 * image.max())
+@pytest.mark.parametrize("count", [1, 2, 25, 40])
+def test_the_shadows_of_any_number_of_lights_are_told_apart(count):
+    # More lights than a label has bits: each casts a shadow of its own.
+    positions = np.array([(2.5 * np.cos(a), 2.0 * np.sin(a), 2.0) for a in np.linspace(0, 6, count)])
+    lights = [model.PointEmitter(position=p, intensity=ONE) for p in positions.tolist()]
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0.01, 11.99, 100), np.linspace(0.01, 7.99, 80)))
+    _, label = film_radiance(scene(floor(), ball((0.0, 0.0, 0.5), 0.2), *lights))(x, y)
+    # Around each point of the floor the same: seen, or hidden by the ball, from each light.
+    points = seen_from_above(x, y)
+    towards = positions[:, None] - points
+    along = np.clip(((np.array([0, 0, 0.5]) - points) * towards).sum(-1) / (towards**2).sum(-1), 0, 1)
+    hidden = np.linalg.norm(points + along[..., None] * towards - [0, 0, 0.5], axis=-1) < 0.2
+    # The ball, seen from above at distance 4 - 0.5, covers directions of less than asin(0.2 / 3.5) around its center.
+    on_ball = np.hypot(points[:, 0], points[:, 1]) / 4 < np.tan(np.arcsin(0.2 / 3.5))
+    states = np.packbits(hidden, axis=0).T[~on_ball]
+    assert len(np.unique(states, axis=0)) > count
+    # As many labels as states, and as many as pairs of both: one for one.
+    pairs = np.column_stack([states, label[~on_ball][:, None].view(np.uint8).reshape(len(states), 8)])
+    assert len(np.unique(states, axis=0)) == len(np.unique(label[~on_ball])) == len(np.unique(pairs, axis=0))
+    assert not set(label[on_ball]) & set(label[~on_ball])
 
 
 def test_the_kinks_of_a_spot_are_within_the_bound():
     spot = model.SpotEmitter(
         position=(0.3, 0.2, 3.0), direction=(0.0, 0.0, -1.0), intensity=RGB, beam_width=10.0, cutoff_angle=11.0
     )
-    expectation = closed_form(scene(floor(), spot))
-    per_axis = 256
-    x, y = np.meshgrid(*((np.arange(n * per_axis) + 0.5) / per_axis for n in (12, 8)))
-    sampled = film_radiance(scene(floor(), spot))(x.ravel(), y.ravel())[0]
-    sampled = sampled.reshape(8, per_axis, 12, per_axis, 3).mean(axis=(1, 3))
-    # The midpoint rule errs by 1e-5 at the kinks.
-    allowed = expectation.error_bound + 2e-5 * expectation.radiance.max()
+    expectation = closed_form(scene(floor(), spot, width=6, height=4))
+    per_axis = 100
+    x, y = np.meshgrid(*((np.arange(n * per_axis) + 0.5) / per_axis for n in (6, 4)))
+    sampled = film_radiance(scene(floor(), spot, width=6, height=4))(x.ravel(), y.ravel())[0]
+    sampled = sampled.reshape(4, per_axis, 6, per_axis, 3).mean(axis=(1, 3))
+    # The midpoint rule errs by 3e-5 at the kinks.
+    allowed = expectation.error_bound + 5e-5 * expectation.radiance.max()
     assert np.all(np.abs(expectation.radiance - sampled) <= allowed)
 
 
@@ -382,8 +393,8 @@ WALL = model.Object(shape=rectangle((9.0, 0.0, 1.0), (0.0, 9.0, 0.0), (0.0, 0.0,
         (scene(floor(), lamp(), SKY), "/emitters/0/shape may hide /emitters/1 from /objects/0"),
         # A sphere has no side behind which an occluder would be harmless.
         (
-            scene(floor(), ball((0.0, 0.0, 3.0)), model.AreaEmitter(shape=model.Sphere(center=(0.0, 0.0, 2.0), radius=0.3),
-                                                                    radiance=RGB)),
+            scene(floor(), ball((0.0, 0.0, 3.0)),
+                  model.AreaEmitter(shape=model.Sphere(center=(0.0, 0.0, 2.0), radius=0.3), radiance=RGB)),
             "/objects/1/shape may hide /emitters/0 from /objects/0",
         ),
     ],
@@ -438,8 +449,8 @@ def test_a_harmless_occluder_is_no_obstacle(accepted):
 
 # ----------------------------------------------------------------------------------------------------- Mitsuba 3
 
-# Every family as drawn with one seed, and on half of its film with three more.
-CASES = [(name, 0, 1) for name in FAMILIES] + [(name, seed, 2) for name in FAMILIES for seed in (1, 2, 3)]
+# Every family as drawn with one seed, and on half of its film with two more.
+CASES = [(name, 0, 1) for name in FAMILIES] + [(name, seed, 2) for name in FAMILIES for seed in (1, 2)]
 IMAGES, SPP = 32, 8
 TILES = 6, 4
 # All channels of all cases, half of the chance of a false alarm for whole images and half for tiles.
@@ -448,22 +459,19 @@ FALSE_ALARM = 1e-6
 SINGLE = 2e-5
 
 
-@cache
-def rendered(name, seed, shrink):
-    """The expectation of a case, and independent renderings of it, shape (IMAGES, height, width, 3)."""
-    import tempfile
-    from pathlib import Path
+def member_on_film(name, seed, shrink):
+    member = FAMILIES[name].member(seed)
+    size = {"width": member.film.width // shrink, "height": member.film.height // shrink}
+    return member.model_copy(update={"film": member.film.model_copy(update=size)})
 
+
+def rendered(member, folder):
+    """Independent renderings of a scene, shape (IMAGES, height, width, 3)."""
     import mitsuba
 
     mitsuba.set_variant("scalar_rgb")
-    member = FAMILIES[name].member(seed)
-    film = member.film.model_copy(update={"width": member.film.width // shrink, "height": member.film.height // shrink})
-    member = member.model_copy(update={"film": film})
-    with tempfile.TemporaryDirectory() as folder:
-        loaded = mitsuba.load_file(str(export(member, "mitsuba3", Path(folder))))
-    images = [np.array(mitsuba.render(loaded, spp=SPP, seed=1000 * seed + k), float) for k in range(IMAGES)]
-    return closed_form(member), np.stack(images)
+    loaded = mitsuba.load_file(str(export(member, "mitsuba3", folder)))
+    return np.stack([np.array(mitsuba.render(loaded, spp=SPP, seed=k), float) for k in range(IMAGES)])
 
 
 def assert_means_agree(images, expected, bound, comparisons):
@@ -484,9 +492,21 @@ def tiles(image):
 
 
 @pytest.mark.parametrize(("name", "seed", "shrink"), CASES)
-def test_mitsuba_shows_what_is_expected(name, seed, shrink):
-    expectation, images = rendered(name, seed, shrink)
-    expected, bound = expectation.radiance, expectation.error_bound
+def test_mitsuba_shows_what_is_expected(name, seed, shrink, tmp_path):
+    member = member_on_film(name, seed, shrink)
+    images = rendered(member, tmp_path)
+    if shrink == 1:
+        expectation = closed_form(member)
+        expected, bound = expectation.radiance, expectation.error_bound
+    else:
+        # The same to three digits, which is enough here and takes less time.
+        expected, bound = pixels.average(film_radiance(member), member.film.width, member.film.height, 1e-3)
     in_all = 3 * len(CASES)
     assert_means_agree(images.mean(axis=(1, 2)), expected.mean(axis=(0, 1)), bound.mean(axis=(0, 1)), in_all)
-    assert_means_agree(tiles(images), tiles(expected), tiles(bound), in_all * TILES[0] * TILES[1])
+    # Where next to no light arrives, a few rare samples are no normal distribution.
+    bright = tiles(expected).min(axis=-1) > 0.01 * expected.mean()
+    assert bright.sum() >= 6
+    in_all *= TILES[0] * TILES[1]
+    assert_means_agree(tiles(images)[:, bright], tiles(expected)[bright], tiles(bound)[bright], in_all)
+    dark = tiles(expected).max(axis=-1) == 0
+    assert not tiles(images)[:, dark].any()

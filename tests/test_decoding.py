@@ -175,7 +175,7 @@ def test_every_value_of_a_png_is_decoded_by_the_srgb_formula(tmp_path, dtype, ch
 def test_other_chunks_do_not_change_what_a_png_shows(tmp_path, capfd):
     pixels = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint8).reshape(HEIGHT, WIDTH, 3)
     extra = [
-        (b"gAMA", struct.pack(">I", 100000)),
+        (b"gAMA", struct.pack(">I", 45455)),
         (b"iCCP", b"broken\0\0" + zlib.compress(b"no profile")),
         (b"tRNS", struct.pack(">HHH", 3, 4, 5)),
         (b"pHYs", b"far too short"),
@@ -380,6 +380,12 @@ def test_png_whose_checksums_are_right_and_pixels_are_not_is_refused_in_silence(
     assert capfd.readouterr().err == ""
 
 
+def test_png_with_a_wrong_checksum_is_refused_even_if_its_pixels_are_right(tmp_path):
+    content = bytearray(png(np.zeros((HEIGHT, WIDTH, 3), np.uint8)))
+    content[content.index(b"IEND") - 5] ^= 1
+    assert complaint(written(tmp_path / "image.png", bytes(content)), "png") == "broken or truncated PNG file"
+
+
 def test_png_that_unpacks_to_gigabytes_is_refused_before(tmp_path):
     data = zlib.compress(bytes(1 << 28), 9)
     path = written(tmp_path / "image.png", png(np.zeros((HEIGHT, WIDTH, 3), np.uint8), data=data))
@@ -461,10 +467,9 @@ def test_bad_pixels_are_counted_and_located_in_any_one_channel(tmp_path, format_
 
 
 def test_a_signalling_nan_is_found_without_a_warning(tmp_path):
-    content = bytearray(pfm(a_picture()))
-    content[-4:] = b"\x01\x00\xa0\x7f"
-    message = complaint(written(tmp_path / "image.pfm", bytes(content)), "pfm")
-    assert message == "1 NaN of 240 pixels, first at x = 23, y = 0"
+    path, _ = an_image(tmp_path, "exr", compression="none")
+    content = path.read_bytes()[:-4] + b"\x01\x00\xa0\x7f"
+    assert complaint(written(path, content), "exr") == "1 NaN of 240 pixels, first at x = 23, y = 9"
 
 
 def test_half_that_overflowed_is_infinite(tmp_path):

@@ -13,11 +13,11 @@ hangs-with-children)
     # Children and grandchildren that ignore every polite request.
     for child in 1 2; do
         sh -c 'trap "" TERM INT HUP; (trap "" TERM; echo $$ >>"$1/pids"; exec sleep 100) & echo $! >>"$1/pids"
-               while :; do sleep 100; done' sh "$here" &
+               sleep 100; sleep 100' sh "$here" &
     done
     trap "" TERM; echo $$ >>"$here/pids"; wait ;;
 leaves-a-child) sleep 100 & echo $! >>"$here/pids" ;;
-leaves-a-daemon) setsid sleep 3 & ;;
+leaves-a-daemon) setsid sleep 4 & sleep 0.2 ;;
 writes-nothing) echo done ;;
 writes-elsewhere) echo >"$(dirname "$output")/picture.pfm" ;;
 writes-strange-names) : >"$(dirname "$output")/$(printf 'a\033[31m\nb')" ;;
