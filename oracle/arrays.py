@@ -40,25 +40,76 @@ def vector(name: str, value: ArrayLike) -> Floats:
     return array
 
 
-def spectrum(name: str, value: ArrayLike) -> Floats:
-    """Like `finite`, for a quantity of light: one number for each colour channel, at least 0."""
+def light(name: str, value: ArrayLike) -> Floats:
+    """Like `finite`, for a quantity of light of any shape: at least 0."""
     array = finite(name, value)
-    if array.ndim != 1:
-        raise InvalidArgument(f"{name} has shape {array.shape}, it must be (C,) with one number for each channel")
     _refuse(name, array, array < 0, "is {}, light is at least 0")
     return array
 
 
-def direction(name: str, value: ArrayLike) -> Floats:
-    """Like `finite` for vectors (..., 3), scaled to unit length."""
+def spectrum(name: str, value: ArrayLike) -> Floats:
+    """Like `light`, for one number for each colour channel."""
+    array = light(name, value)
+    if array.ndim != 1 or not len(array):
+        raise InvalidArgument(f"{name} has shape {array.shape}, it must be (C,) with one number for each channel")
+    return array
+
+
+def length(name: str, value: float) -> float:
+    """Return `value` as a positive, finite float.
+
+    Raises
+    ------
+    InvalidArgument
+        If it is anything else.
+    """
+    number = finite(name, value)
+    if number.ndim:
+        raise InvalidArgument(f"{name} has shape {number.shape}, it must be a single number")
+    if number <= 0:
+        raise InvalidArgument(f"{name} is {number}, it must be positive")
+    return float(number)
+
+
+def indices(name: str, value: ArrayLike, count: int) -> Integers:
+    """Return `value` as read-only integers of shape (M, 3), M >= 1, each in [0, count)."""
+    array = np.array(value)
+    if array.ndim != 2 or array.shape[1] != 3 or not len(array):
+        raise InvalidArgument(f"{name} has shape {array.shape}, it must be (M, 3) with M >= 1")
+    if not np.issubdtype(array.dtype, np.integer):
+        raise InvalidArgument(f"{name} holds {array.dtype}, it must hold integers")
+    _refuse(name, array, (array < 0) | (array >= count), f"is {{}}, there are {count} vertices")
+    result = array.astype(np.int64)
+    result.flags.writeable = False
+    return result
+
+
+def direction(name: str, value: ArrayLike, any_length: bool = False) -> Floats:
+    """Like `finite` for unit vectors (..., 3), whose rounding errors are mended by scaling them to length 1.
+
+    Raises
+    ------
+    InvalidArgument
+        If a vector has no length or, unless `any_length`, one that differs from 1 by more than 1e-6.
+    """
     array = finite(name, value, (3,))
     # Scaled first, so that the squares of neither huge nor tiny components leave the range of float64.
     largest = np.abs(array).max(axis=-1, keepdims=True)
     _refuse(name, largest[..., 0], largest[..., 0] == 0, "has no length")
     scaled = array / largest
-    unit: Floats = scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
+    lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    if not any_length:
+        total = (largest * lengths)[..., 0]
+        _refuse(name, total, np.abs(total - 1) > 1e-6, "has length {}, it must be a unit vector")
+    unit: Floats = scaled / lengths
     unit.flags.writeable = False
     return unit
+
+
+def replace(instance: object, **values: object) -> None:
+    """Replace fields of a frozen dataclass by their checked form, during its construction only."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
 
 
 def _refuse(name: str, array: Floats, bad: Booleans, reason: str) -> None:

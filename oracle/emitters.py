@@ -6,21 +6,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from oracle.arrays import Floats, InvalidArgument, direction, finite, spectrum, vector
-
-
-def _set(instance: object, **values: object) -> None:
-    """Replace fields of a frozen dataclass by their checked form, during its construction only."""
-    for name, value in values.items():
-        object.__setattr__(instance, name, value)
+from oracle.arrays import Floats, InvalidArgument, direction, finite, light, replace, spectrum, vector
+from oracle.shapes import Shape
 
 
 @dataclass(frozen=True, eq=False)
 class Receivers:
-    """Oriented points that light falls on: points [m] and normals (any length), broadcast to one shape (..., 3)."""
+    """Oriented points that light falls on: points [m] and unit normals, broadcast to one shape (..., 3)."""
 
     points: Floats
     normals: Floats
@@ -31,7 +27,12 @@ class Receivers:
             shape = np.broadcast_shapes(points.shape, normals.shape)
         except ValueError:
             raise InvalidArgument(f"points {points.shape} and normals {normals.shape} do not fit together") from None
-        _set(self, points=np.broadcast_to(points, shape), normals=np.broadcast_to(normals, shape))
+        replace(self, points=np.broadcast_to(points, shape), normals=np.broadcast_to(normals, shape))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many receivers along each axis."""
+        return self.points.shape[:-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ class Point:
     intensity: Floats
 
     def __post_init__(self) -> None:
-        _set(
+        replace(
             self,
             position=vector("position", self.position),
             intensity=spectrum("intensity", self.intensity),
@@ -64,7 +65,7 @@ class Spot:
     cutoff_angle: float
 
     def __post_init__(self) -> None:
-        _set(
+        replace(
             self,
             position=vector("position", self.position),
             direction=direction("direction", vector("direction", self.direction)),
@@ -85,7 +86,7 @@ class Directional:
     irradiance: Floats
 
     def __post_init__(self) -> None:
-        _set(
+        replace(
             self,
             direction=direction("direction", vector("direction", self.direction)),
             irradiance=spectrum("irradiance", self.irradiance),
@@ -93,87 +94,40 @@ class Directional:
 
 
 @dataclass(frozen=True, eq=False)
-class Polygon:
-    """A flat polygon with uniform diffuse radiance on its front.
+class Line:
+    """A straight line from `start` to `end` [m] that shines like a thin diffuse tube.
 
-    Vertices [m], shape (N, 3), N >= 3, counter-clockwise seen from the front; non-convex is allowed.
-    Radiance [W/(m^2 sr)], shape (C,).
+    Each metre has the intensity `intensity_per_length` [W/(sr m)], shape (C,), across the line, and the sine of the
+    angle to the line times as much elsewhere. A tube of radius r and radiance L has 2 r L.
     """
 
-    vertices: Floats
-    radiance: Floats
+    start: Floats
+    end: Floats
+    intensity_per_length: Floats
 
     def __post_init__(self) -> None:
-        vertices = finite("vertices", self.vertices, (3,))
-        if vertices.ndim != 2 or len(vertices) < 3:
-            raise InvalidArgument(f"vertices has shape {vertices.shape}, a polygon needs (N, 3) with N >= 3")
-        _set(self, vertices=vertices, radiance=spectrum("radiance", self.radiance))
-        relative = vertices - vertices[0]
-        size = float(np.abs(relative).max())
-        doubled_area = self._area_vector()
-        if np.linalg.norm(doubled_area) <= 1e-14 * size**2:
-            raise InvalidArgument("vertices enclose no area")
-        off_plane = np.abs(relative @ self.normal)
-        if off_plane.max() > 1e-9 * size:
-            raise InvalidArgument(f"vertices[{int(off_plane.argmax())}] lies {off_plane.max():g} m off the plane")
-        crossing = self._first_crossing()
-        if crossing:
-            raise InvalidArgument("vertices: the edges that begin at [{}] and [{}] cross".format(*crossing))
-
-    def _area_vector(self) -> Floats:
-        relative = self.vertices - self.vertices[0]
-        total: Floats = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
-        return total
-
-    def _first_crossing(self) -> tuple[int, int] | None:
-        """The first two edges that pass through each other; edges that only touch do not count."""
-        a = self.vertices - self.vertices[0]
-        b = np.roll(a, -1, axis=0)
-        # side[i, j]: on which side of edge i vertex j lies, and with `across` whether edge i separates the ends of j.
-        side = np.einsum("k,ijk->ij", self.normal, np.cross((b - a)[:, None], a[None] - a[:, None]))
-        side[np.abs(side) <= 1e-12 * np.abs(a).max() ** 2] = 0
-        across = side * np.roll(side, -1, axis=1) < 0
-        crossings = np.argwhere(across & across.T)
-        return (int(crossings[0, 0]), int(crossings[0, 1])) if crossings.size else None
-
-    @property
-    def normal(self) -> Floats:
-        """Unit normal of the front."""
-        return direction("normal", self._area_vector())
-
-
-@dataclass(frozen=True, eq=False)
-class Disk:
-    """A flat disk with uniform diffuse radiance [W/(m^2 sr)], shape (C,), on the side that `normal` points to."""
-
-    center: Floats
-    normal: Floats
-    radius: float
-    radiance: Floats
-
-    def __post_init__(self) -> None:
-        _set(
+        replace(
             self,
-            center=vector("center", self.center),
-            normal=direction("normal", vector("normal", self.normal)),
-            radiance=spectrum("radiance", self.radiance),
+            start=vector("start", self.start),
+            end=vector("end", self.end),
+            intensity_per_length=spectrum("intensity_per_length", self.intensity_per_length),
         )
-        if not 0 < self.radius < np.inf:
-            raise InvalidArgument(f"radius is {self.radius}, a disk needs a positive one")
+        if (self.start == self.end).all():
+            raise InvalidArgument("start and end are the same point")
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
-    """A sphere with uniform diffuse radiance [W/(m^2 sr)], shape (C,), on its outside."""
+class Area:
+    """A shape with uniform diffuse radiance [W/(m^2 sr)], shape (C,), on its front, or on both of its sides."""
 
-    center: Floats
-    radius: float
+    shape: Shape
     radiance: Floats
+    two_sided: bool = False
 
     def __post_init__(self) -> None:
-        _set(self, center=vector("center", self.center), radiance=spectrum("radiance", self.radiance))
-        if not 0 < self.radius < np.inf:
-            raise InvalidArgument(f"radius is {self.radius}, a sphere needs a positive one")
+        if not isinstance(self.shape, Shape):
+            raise InvalidArgument(f"shape is a {type(self.shape).__name__}, not one of oracle.shapes")
+        replace(self, radiance=spectrum("radiance", self.radiance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,4 +137,61 @@ class Constant:
     radiance: Floats
 
     def __post_init__(self) -> None:
-        _set(self, radiance=spectrum("radiance", self.radiance))
+        replace(self, radiance=spectrum("radiance", self.radiance))
+
+
+@dataclass(frozen=True, eq=False)
+class CosineSky:
+    """An infinitely distant hemisphere around `up` whose radiance is linear in the sine of the elevation.
+
+    It goes from `horizon` to `zenith` [W/(m^2 sr)], shape (C,) each; the other hemisphere, the ground, is black.
+    """
+
+    up: Floats
+    horizon: Floats
+    zenith: Floats
+
+    def __post_init__(self) -> None:
+        replace(
+            self,
+            up=direction("up", vector("up", self.up)),
+            horizon=spectrum("horizon", self.horizon),
+            zenith=spectrum("zenith", self.zenith),
+        )
+        if self.horizon.shape != self.zenith.shape:
+            raise InvalidArgument(f"horizon {self.horizon.shape} and zenith {self.zenith.shape} differ in shape")
+
+    @classmethod
+    def cie_overcast(cls, up: Floats, zenith: Floats) -> CosineSky:
+        """The CIE standard overcast sky, three times as bright at the zenith as at the horizon [CIE S 011, type 16]."""
+        return cls(up, spectrum("zenith", zenith) / 3, zenith)
+
+
+@dataclass(frozen=True, eq=False)
+class Equirectangular:
+    """An infinitely distant environment given as a map of texels, each of uniform radiance.
+
+    Radiance [W/(m^2 sr)], shape (H, W, C). Row 0 begins at the pole `up`, the last row ends at the other pole; column
+    0 begins at the meridian through the unit vector `front`, orthogonal to `up`, and columns go round `up`
+    counter-clockwise seen from above. All rows are equally high in angle, all columns equally wide.
+    """
+
+    radiance: Floats
+    up: Floats
+    front: Floats
+
+    def __post_init__(self) -> None:
+        radiance = light("radiance", self.radiance)
+        if radiance.ndim != 3 or 0 in radiance.shape:
+            raise InvalidArgument(f"radiance has shape {radiance.shape}, a map needs (H, W, C)")
+        replace(
+            self,
+            radiance=radiance,
+            up=direction("up", vector("up", self.up)),
+            front=direction("front", vector("front", self.front)),
+        )
+        if abs(self.up @ self.front) > 1e-9:
+            raise InvalidArgument("up and front are not orthogonal")
+
+
+Emitter: TypeAlias = Point | Spot | Directional | Line | Area | Constant | CosineSky | Equirectangular

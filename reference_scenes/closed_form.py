@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from oracle import emitters, intersection, pixels
-from oracle.arrays import Booleans, Floats, Integers
+from oracle import shapes as oracle_shapes
+from oracle.arrays import Booleans, Floats, Integers, direction
 from oracle.emitters import Receivers
 from oracle.expectation import Expectation, Provenance
 from oracle.irradiance import irradiance
@@ -81,37 +82,39 @@ def hit_shape(
             return t, normals[face], face
 
 
-def _oracle_emitters(emitter: model.Emitter) -> tuple[object, ...]:
-    """The emitters of `oracle.emitters` that together shine like one of the scene."""
+def _oracle_emitter(emitter: model.Emitter) -> emitters.Emitter:
+    """The emitter of `oracle.emitters` that shines like one of the scene."""
     match emitter:
         case model.PointEmitter():
-            return (emitters.Point(np.array(emitter.position), np.array(emitter.intensity)),)
+            return emitters.Point(np.array(emitter.position), np.array(emitter.intensity))
         case model.SpotEmitter():
-            return (
-                emitters.Spot(
-                    np.array(emitter.position),
-                    np.array(emitter.direction),
-                    np.array(emitter.intensity),
-                    np.radians(emitter.beam_width),
-                    np.radians(emitter.cutoff_angle),
-                ),
+            return emitters.Spot(
+                np.array(emitter.position),
+                _unit(emitter.direction),
+                np.array(emitter.intensity),
+                np.radians(emitter.beam_width),
+                np.radians(emitter.cutoff_angle),
             )
         case model.DirectionalEmitter():
-            return (emitters.Directional(np.array(emitter.direction), np.array(emitter.irradiance)),)
+            return emitters.Directional(_unit(emitter.direction), np.array(emitter.irradiance))
         case model.ConstantEmitter():
-            return (emitters.Constant(np.array(emitter.radiance)),)
+            return emitters.Constant(np.array(emitter.radiance))
         case model.AreaEmitter():
             radiance = np.array(emitter.radiance)
             match emitter.shape:
                 case model.Rectangle() as shape:
-                    return (emitters.Polygon(_rectangle_corners(shape), radiance),)
+                    return emitters.Area(oracle_shapes.Polygon(_rectangle_corners(shape)), radiance)
                 case model.Disk() as shape:
-                    return (emitters.Disk(np.array(shape.center), np.array(shape.normal), shape.radius, radiance),)
+                    normal = _unit(shape.normal)
+                    return emitters.Area(oracle_shapes.Disk(np.array(shape.center), normal, shape.radius), radiance)
                 case model.Sphere() as shape:
-                    return (emitters.Sphere(np.array(shape.center), shape.radius, radiance),)
+                    return emitters.Area(oracle_shapes.Sphere(np.array(shape.center), shape.radius), radiance)
                 case model.Mesh() as shape:
-                    corners = np.array(shape.vertices)[np.array(shape.triangles)]
-                    return tuple(emitters.Polygon(triangle, radiance) for triangle in corners)
+                    return emitters.Area(oracle_shapes.Mesh(np.array(shape.vertices), np.array(shape.triangles)), radiance)
+
+
+def _unit(vector: model.Vector) -> Floats:
+    return direction("direction", vector, any_length=True)
 
 
 def _rectangle_corners(shape: model.Rectangle) -> Floats:
@@ -293,7 +296,7 @@ def _direct_light(scene: model.Scene, shapes: list[model.Shape], receivers: Rece
             case model.ConstantEmitter():
                 visible = np.ones(len(total), dtype=np.bool_)
                 state = np.zeros(len(total), dtype=np.int64)
-        light: Floats = sum((irradiance(part, receivers) for part in _oracle_emitters(emitter)), np.zeros(3))
+        light = irradiance(_oracle_emitter(emitter), receivers).value
         total += np.where(visible[:, None], light, 0.0)
         label = label * _MIX + state
     return total, label

@@ -1,0 +1,166 @@
+"""Irradiance at oriented points, in closed form, clipped at the receiver's horizon."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import reduce
+from itertools import product
+from operator import add
+
+import numpy as np
+
+from oracle.arrays import Floats, InvalidArgument
+from oracle.bounded import Bounded
+from oracle.emitters import (
+    Area,
+    Constant,
+    CosineSky,
+    Directional,
+    Emitter,
+    Equirectangular,
+    Line,
+    Point,
+    Receivers,
+    Spot,
+)
+from oracle.irradiance import disk, environment, line, point_like, polygon, sphere
+from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
+
+__all__ = ["irradiance", "projected_solid_angle"]
+
+# Intermediate results of so many receivers stay within the processor's cache.
+_AT_ONCE = 16384
+
+
+def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers) -> Bounded:
+    """Irradiance of one emitter, or of several together, clipped at each receiver's horizon.
+
+    Parameters
+    ----------
+    emitter : Emitter or sequence of Emitter
+        All with the same number of channels C.
+    receivers : Receivers
+        Points [m] and unit normals, shape (..., 3).
+
+    Returns
+    -------
+    Bounded
+        Irradiance [W/m^2] and a bound on its error, shape (..., C).
+
+    Raises
+    ------
+    InvalidArgument
+        If there is no emitter, or their numbers of channels differ.
+
+    Notes
+    -----
+    Light adds up [Lambert 1760]. The module of each kind of emitter states formula and source.
+    """
+    together = list(emitter) if isinstance(emitter, Sequence) else [emitter]
+    if not together:
+        raise InvalidArgument("emitter is an empty sequence")
+    channels = [_channels(one) for one in together]
+    for index, count in enumerate(channels):
+        if count != channels[0]:
+            raise InvalidArgument(f"emitter[{index}] has {count} channels, emitter[0] has {channels[0]}")
+    shape = (*receivers.shape, channels[0])
+    result = Bounded(np.empty(shape), np.empty(shape))
+    for part in _chunks(receivers.shape):
+        points, normals = receivers.points[part].reshape(-1, 3), receivers.normals[part].reshape(-1, 3)
+        here = reduce(add, (_of_one(one, points, normals) for one in together))
+        result.value[part] = here.value.reshape(result.value[part].shape)
+        result.error[part] = here.error.reshape(result.error[part].shape)
+    return result
+
+
+def projected_solid_angle(shape: Shape, receivers: Receivers, two_sided: bool = False) -> Bounded:
+    """Solid angle of a shape weighted with the receiver's cosine: the irradiance of unit radiance.
+
+    Parameters
+    ----------
+    shape : Shape
+        Only its front counts, or both of its sides if `two_sided`.
+    receivers : Receivers
+        Points [m] and unit normals, shape (..., 3).
+
+    Returns
+    -------
+    Bounded
+        Projected solid angle [sr], shape (...); divided by pi it is the view factor from the receiver to the shape.
+    """
+    result = irradiance(Area(shape, np.ones(1), two_sided), receivers)
+    return Bounded(result.value[..., 0], result.error[..., 0])
+
+
+def _channels(emitter: Emitter) -> int:
+    match emitter:
+        case Point() | Spot():
+            return len(emitter.intensity)
+        case Directional():
+            return len(emitter.irradiance)
+        case Line():
+            return len(emitter.intensity_per_length)
+        case Area() | Constant():
+            return len(emitter.radiance)
+        case CosineSky():
+            return len(emitter.zenith)
+        case Equirectangular():
+            return emitter.radiance.shape[2]
+
+
+def _of_one(emitter: Emitter, points: Floats, normals: Floats) -> Bounded:
+    """Irradiance (N, C) of one emitter at receivers (N, 3)."""
+    match emitter:
+        case Point():
+            return _times(point_like.point(emitter, points, normals), emitter.intensity)
+        case Spot():
+            return _times(point_like.spot(emitter, points, normals), emitter.intensity)
+        case Directional():
+            return _times(point_like.directional(emitter, normals), emitter.irradiance)
+        case Line():
+            return _times(line.line(emitter, points, normals), emitter.intensity_per_length)
+        case Area():
+            return _times(_of_shape(emitter.shape, points, normals, emitter.two_sided), emitter.radiance)
+        case Constant():
+            return environment.constant(emitter, normals)
+        case CosineSky():
+            return environment.cosine_sky(emitter, normals)
+        case Equirectangular():
+            return environment.equirectangular(emitter, normals)
+
+
+def _of_shape(shape: Shape, points: Floats, normals: Floats, two_sided: bool) -> Bounded:
+    """Projected solid angle (N,) of a shape."""
+    match shape:
+        case Polygon():
+            return polygon.polygon(shape, points, normals, two_sided)
+        case Rectangle():
+            return polygon.polygon(shape.polygon, points, normals, two_sided)
+        case Disk():
+            return disk.disk(shape, points, normals, two_sided)
+        case Sphere():
+            return sphere.sphere(shape, points, normals, two_sided)
+        case Mesh():
+            return reduce(add, (polygon.polygon(one, points, normals, two_sided) for one in shape.polygons))
+
+
+def _times(factor: Bounded, spectrum: Floats) -> Bounded:
+    """A geometric factor (N,) times a spectrum (C,): (N, C)."""
+    return Bounded(factor.value[:, None], factor.error[:, None]) * spectrum
+
+
+def _chunks(shape: tuple[int, ...]) -> Iterator[tuple[int | slice, ...]]:
+    """Indices that together select all of an array with leading axes `shape`, each at most `_AT_ONCE` entries."""
+    # As many of the last axes as fit stay whole; the axis before them is sliced, those before it are counted.
+    whole = len(shape)
+    inner = 1
+    while whole and inner * shape[whole - 1] <= _AT_ONCE:
+        whole -= 1
+        inner *= shape[whole]
+    if whole == 0:
+        yield ()
+        return
+    step = max(1, _AT_ONCE // max(inner, 1))
+    for outer in product(*(range(n) for n in shape[: whole - 1])):
+        for start in range(0, shape[whole - 1], step):
+            yield (*outer, slice(start, start + step))
