@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, TypeAdapter
+from pydantic import BaseModel, Field, TypeAdapter
 
 from graders.result import Result
 from graders.rubric import Rubric
 from graders.submission import Submission
+from oracle.truth import AnyCase
 from reference_scenes.families import FAMILIES
 from reference_scenes.model import Scene
 
@@ -21,7 +23,13 @@ HERE = Path(__file__).parent
 
 def generated() -> dict[Path, str]:
     """Every generated file and what it should hold."""
-    kinds = {"scene": Scene, "submission": Submission, "rubric": Rubric, "result": Result}
+    kinds = {
+        "scene": Scene,
+        "submission": Submission,
+        "rubric": Rubric,
+        "result": Result,
+        "truth": Annotated[list[AnyCase], Field(title="Cases")],
+    }
     files = {HERE / "schema" / f"{name}.schema.json": _schema(kind) for name, kind in kinds.items()}
     files[HERE / "families.md"] = _families()
     return files

@@ -85,7 +85,7 @@ def indices(name: str, value: ArrayLike, count: int) -> Integers:
 
 
 def direction(name: str, value: ArrayLike, any_length: bool = False) -> Floats:
-    """Like `finite` for unit vectors (..., 3), whose rounding errors are mended by scaling them to length 1.
+    """Like `finite` for unit vectors (..., 3), scaled to length 1 where they differ from it by more than rounding.
 
     Raises
     ------
@@ -102,6 +102,8 @@ def direction(name: str, value: ArrayLike, any_length: bool = False) -> Floats:
         total = (largest * lengths)[..., 0]
         _refuse(name, total, np.abs(total - 1) > 1e-6, "has length {}, it must be a unit vector")
     unit: Floats = scaled / lengths
+    # What is as long as rounding allows stays as it is: scaling would turn it by an ulp.
+    unit = np.where(np.abs(largest * lengths - 1) < 4 * np.finfo(np.float64).eps, array, unit)
     unit.flags.writeable = False
     return unit
 

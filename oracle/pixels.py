@@ -27,6 +27,8 @@ _CORNER_X, _CORNER_Y = np.array([0.0, 1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0, 
 _POINTS_X = np.concatenate([_GAUSS_X, _COARSE_X, _CORNER_X])
 _POINTS_Y = np.concatenate([_GAUSS_Y, _COARSE_Y, _CORNER_Y])
 
+# Orders of quadrature tried on a smooth pixel before it is split; the difference from the order before is the bound.
+_HIGHER_ORDERS = (3, 5, 8, 13)
 _BISECTIONS = 20
 _SPLITS_TO_FIND_EDGES = 2
 _FIRST_SPLIT_TO_FOLLOW_EDGES = 2
@@ -83,7 +85,8 @@ def average(image: Image, width: int, height: int, relative_tolerance: float = 1
 
     Notes
     -----
-    Smooth cells: tensor Gauss-Legendre quadrature with 3 x 3 nodes, its difference from 2 x 2 nodes as the bound.
+    Smooth cells: tensor Gauss-Legendre quadrature with 3 x 3 nodes, its difference from 2 x 2 nodes as the bound; where
+    that is not enough, a smooth pixel gets up to 13 x 13 nodes before it is split.
     Cells with an edge: the edge is found on the cell's sides by bisection and taken as straight in between; cells
     are split until the estimate of a parent and the sum of its children agree, down to 1/8 pixel at least. Beside an
     edge pixels are searched for its continuation at 272 points. So a strip wider than 0.3 pixels is always seen, and
@@ -97,6 +100,11 @@ def average(image: Image, width: int, height: int, relative_tolerance: float = 1
     allowed = relative_tolerance * (0.1 * scale + 0.9 * np.abs(mean))
 
     finished = np.zeros(len(mixed), dtype=np.bool_)
+    beside_edges = _dilated(mixed, width)
+    imprecise = (error > allowed).any(axis=1)
+    for chunk in _chunks(pixels.take(imprecise & ~beside_edges)):
+        raised = _raise_order(image, chunk, allowed[chunk.pixel])
+        mean[chunk.pixel], error[chunk.pixel], mixed[chunk.pixel] = raised.mean, raised.error, raised.mixed
     pending = _dilated(mixed, width) | (error > allowed).any(axis=1)
     while pending.any():
         for chunk in _chunks(pixels.take(pending)):
@@ -141,6 +149,29 @@ def _touching(cells: _Cells, chosen: Booleans) -> Booleans:
         for dx in (-1, 0, 1):
             touching |= np.isin(key + dy * stride + dx, keys_chosen)
     return touching
+
+
+def _raise_order(image: Image, cells: _Cells, allowed: Floats) -> _Estimate:
+    """Mean over smooth cells by quadrature of rising order until two orders agree; cells with an edge are told apart."""
+    count = len(cells.pixel)
+    result = _Estimate(np.zeros_like(allowed), np.full_like(allowed, np.inf), np.zeros(count, dtype=np.bool_))
+    pending = np.arange(count)
+    for order in _HIGHER_ORDERS:
+        nodes, weights = np.polynomial.legendre.leggauss(order)
+        x, y = (axis.ravel() / 2 + 0.5 for axis in np.meshgrid(nodes, nodes))
+        part = cells.take(pending)
+        values, labels = image((part.x[:, None] + part.side * x).ravel(), (part.y[:, None] + part.side * y).ravel())
+        labels = labels.reshape(len(pending), -1)
+        mean = np.einsum("npc,p->nc", values.reshape(*labels.shape, -1), np.outer(weights, weights).ravel() / 4)
+        if order > _HIGHER_ORDERS[0]:
+            result.error[pending] = np.abs(mean - result.mean[pending])
+        result.mean[pending] = mean
+        result.mixed[pending] = (labels != labels[:, :1]).any(axis=1)
+        precise = (result.error[pending] <= allowed[pending]).all(axis=1)
+        pending = pending[~precise & ~result.mixed[pending]]
+        if not len(pending):
+            break
+    return result
 
 
 def _refine(image: Image, pixels: _Cells, allowed: Floats) -> _Estimate:

@@ -242,6 +242,28 @@ def test_smooth_functions_are_within_the_bound(a, b):
     assert np.all(np.abs(mean[..., 0] - along_x * along_y - 2) <= bound[..., 0] + 1e-13)
 
 
+def test_a_smooth_pixel_gets_a_higher_order_before_it_is_split():
+    # 1/(x + 1) has exact means.
+    image, calls = counted(lambda x, y: ((1 / (x + 1))[:, None], np.zeros(len(x), dtype=np.int64)))
+    mean, error = average(image, 6, 1, relative_tolerance=1e-9)
+    left = np.arange(6.0) + 1
+    assert (np.abs(mean[0, :, 0] - np.log1p(1 / left)) <= error[0, :, 0]).all()
+    np.testing.assert_allclose(mean[0, :, 0], np.log1p(1 / left), rtol=1e-9)
+    # 17 points at first, then as many as all orders together have; splitting takes 21,000.
+    assert sum(calls) <= 6 * (17 + 9 + 25 + 64 + 169)
+
+
+def test_an_edge_that_only_a_higher_order_sees_is_followed():
+    # A disk between the 17 points of a pixel, on a slope too curved for three nodes.
+    def image(x, y):
+        inside = (x - 0.62) ** 2 + (y - 0.35) ** 2 < 0.06**2
+        return np.where(inside, 5.0, 1 / (x + 0.3))[:, None], inside.astype(np.int64)
+
+    mean, _ = average(image, 1, 1, relative_tolerance=1e-7)
+    hidden, _ = quad(lambda x: 2 * np.sqrt(max(0.06**2 - (x - 0.62) ** 2, 0)) / (x + 0.3), 0.56, 0.68)
+    np.testing.assert_allclose(mean[0, 0, 0], np.log(1.3 / 0.3) - hidden + 5 * np.pi * 0.06**2, rtol=1e-4)
+
+
 def test_a_peak_is_resolved():
     # 1 / (h^2 + r^2) over a peak 0.05 pixels wide has the mean that quadrature along x of the closed form in y gives.
     h = 0.05

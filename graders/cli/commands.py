@@ -137,6 +137,43 @@ def validate_scenes(files: tuple[Path, ...], as_json: bool) -> int:
     return EXIT_RIGHT if run_validate(files, as_json) else EXIT_WRONG
 
 
+@oracle.command(short_help="Evaluate closed forms of light, one or a million.")
+@click.argument("cases", type=_PATH)
+def truth(cases: Path) -> None:
+    """Evaluate the closed forms that CASES ask for: a JSON list, JSON lines, or - for standard input.
+
+    Prints a JSON line for each case, in order: index, value, unit, error (a bound), formula and source. A case that
+    cannot be answered gives index and invalid, the reason; the rest is answered, and the exit code is 2.
+    """
+    from graders.cli.truth import run_truth
+
+    run_truth(cases)
+
+
+class _Kinds(click.Group):
+    """A group with a command for each kind of thing, made from the models of cases when one is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The kinds in the order of the models."""
+        from graders.cli.ask import QUESTIONS
+
+        return list(QUESTIONS[self.name or ""].kinds)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """The command for a kind; raises UsageError with a suggestion."""
+        from graders.cli.ask import command
+
+        return command(self.name or "", cmd_name)
+
+
+@oracle.group(cls=_Kinds, subcommand_metavar="EMITTER [OPTIONS]", short_help="Irradiance at a point.")
+def irradiance() -> None:
+    """Compute the irradiance at a point: value, unit, error bound, formula and source.
+
+    For example: oracle irradiance sphere --center 0,0,2 --radius 0.5 --radiance 10, or with --table radius=0.1:1:20.
+    """
+
+
 @oracle.command(short_help="Tell what this installation can do.")
 @_JSON
 def doctor(as_json: bool) -> int:

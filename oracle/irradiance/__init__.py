@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import reduce
-from itertools import product
 from operator import add
 
 import numpy as np
 
 from oracle.arrays import Floats, InvalidArgument
 from oracle.bounded import Bounded
+from oracle.chunks import chunks
 from oracle.emitters import (
     Area,
     Constant,
@@ -27,9 +27,6 @@ from oracle.irradiance import disk, environment, line, point_like, polygon, sphe
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
 
 __all__ = ["irradiance", "projected_solid_angle"]
-
-# Intermediate results of so many receivers stay within the processor's cache.
-_AT_ONCE = 16384
 
 
 def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers) -> Bounded:
@@ -50,24 +47,28 @@ def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers) -> Bo
     Raises
     ------
     InvalidArgument
-        If there is no emitter, or their numbers of channels differ.
+        If there is no emitter, one is of another type, or their numbers of channels differ.
 
     Notes
     -----
     Light adds up [Lambert 1760]. The module of each kind of emitter states formula and source.
     """
-    together = list(emitter) if isinstance(emitter, Sequence) else [emitter]
+    together = list(emitter) if isinstance(emitter, list | tuple) else [emitter]
     if not together:
         raise InvalidArgument("emitter is an empty sequence")
+    for index, one in enumerate(together):
+        if not isinstance(one, Emitter):
+            raise InvalidArgument(f"emitter[{index}] is a {type(one).__name__}, not one of oracle.emitters")
     channels = [_channels(one) for one in together]
     for index, count in enumerate(channels):
         if count != channels[0]:
             raise InvalidArgument(f"emitter[{index}] has {count} channels, emitter[0] has {channels[0]}")
     shape = (*receivers.shape, channels[0])
     result = Bounded(np.empty(shape), np.empty(shape))
-    for part in _chunks(receivers.shape):
+    parts = [simple for one in together for simple in _parts(one)]
+    for part in chunks(receivers.shape):
         points, normals = receivers.points[part].reshape(-1, 3), receivers.normals[part].reshape(-1, 3)
-        here = reduce(add, (_of_one(one, points, normals) for one in together))
+        here = reduce(add, (_of_one(one, points, normals) for one in parts))
         result.value[part] = here.value.reshape(result.value[part].shape)
         result.error[part] = here.error.reshape(result.error[part].shape)
     return result
@@ -105,7 +106,18 @@ def _channels(emitter: Emitter) -> int:
         case CosineSky():
             return len(emitter.zenith)
         case Equirectangular():
-            return emitter.radiance.shape[2]
+            return int(emitter.radiance.shape[2])
+
+
+def _parts(emitter: Emitter) -> tuple[Emitter, ...]:
+    """The emitter, its shape taken apart into those that have a kernel."""
+    match emitter:
+        case Area(Rectangle() as shape):
+            return (Area(shape.polygon, emitter.radiance, emitter.two_sided),)
+        case Area(Mesh() as shape):
+            return tuple(Area(triangle, emitter.radiance, emitter.two_sided) for triangle in shape.polygons)
+        case _:
+            return (emitter,)
 
 
 def _of_one(emitter: Emitter, points: Floats, normals: Floats) -> Bounded:
@@ -134,33 +146,14 @@ def _of_shape(shape: Shape, points: Floats, normals: Floats, two_sided: bool) ->
     match shape:
         case Polygon():
             return polygon.polygon(shape, points, normals, two_sided)
-        case Rectangle():
-            return polygon.polygon(shape.polygon, points, normals, two_sided)
         case Disk():
             return disk.disk(shape, points, normals, two_sided)
         case Sphere():
             return sphere.sphere(shape, points, normals, two_sided)
-        case Mesh():
-            return reduce(add, (polygon.polygon(one, points, normals, two_sided) for one in shape.polygons))
+        case _:
+            raise AssertionError("taken apart before")
 
 
 def _times(factor: Bounded, spectrum: Floats) -> Bounded:
     """A geometric factor (N,) times a spectrum (C,): (N, C)."""
     return Bounded(factor.value[:, None], factor.error[:, None]) * spectrum
-
-
-def _chunks(shape: tuple[int, ...]) -> Iterator[tuple[int | slice, ...]]:
-    """Indices that together select all of an array with leading axes `shape`, each at most `_AT_ONCE` entries."""
-    # As many of the last axes as fit stay whole; the axis before them is sliced, those before it are counted.
-    whole = len(shape)
-    inner = 1
-    while whole and inner * shape[whole - 1] <= _AT_ONCE:
-        whole -= 1
-        inner *= shape[whole]
-    if whole == 0:
-        yield ()
-        return
-    step = max(1, _AT_ONCE // max(inner, 1))
-    for outer in product(*(range(n) for n in shape[: whole - 1])):
-        for start in range(0, shape[whole - 1], step):
-            yield (*outer, slice(start, start + step))
