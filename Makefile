@@ -1,6 +1,6 @@
 # Every target sets up what it needs first; on a fresh machine python3, make and a C++ compiler are enough.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint sanitize wheel-test lock calibrate generate picture clean
+.PHONY: help setup demo test lint sanitize wheel-test lock calibrate verify bench generate picture clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 16
@@ -50,6 +50,12 @@ lock: ## resolve requirements.lock anew
 
 calibrate: setup ## false alarms and power of the judge, by simulation; minutes
 	@PYTHONPATH=tests .venv/bin/python tests/calibration.py 1000
+
+verify: setup ## every closed form against ball arithmetic in 20,000 configurations; most of an hour
+	@PYTHONPATH=tests .venv/bin/python tests/verification.py 20000
+
+bench: setup ## how fast the closed forms are; minutes
+	@for script in benchmarks/*.py; do echo "== $$script"; .venv/bin/python $$script || exit 1; done
 
 generate: setup ## rewrite the parts of docs that come from the code
 	@.venv/bin/python docs/generate.py

@@ -9,6 +9,8 @@ Rump and Oishi (2005), whose result is as accurate as if computed in twice the p
 
 from __future__ import annotations
 
+import numpy as np
+
 from oracle.arrays import Floats
 
 
@@ -29,6 +31,13 @@ def two_product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 def dot(a: Floats, a_low: Floats | float, b: Floats, b_low: Floats | float, minus: Floats | None = None) -> Floats:
     """``(a + a_low) . (b + b_low) - minus^2``."""
+    return dot_in_parts(a, a_low, b, b_low, minus)[0]
+
+
+def dot_in_parts(
+    a: Floats, a_low: Floats | float, b: Floats, b_low: Floats | float, minus: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """The sum that `dot` returns, and the rounding error of that last addition."""
     total, rest = two_product(a[..., 0], b[..., 0])
     for axis in (1, 2):
         product, low = two_product(a[..., axis], b[..., axis])
@@ -41,7 +50,7 @@ def dot(a: Floats, a_low: Floats | float, b: Floats, b_low: Floats | float, minu
     for x, y in ((a_low, b), (a, b_low)):
         if not isinstance(x, float) and not isinstance(y, float):
             rest = rest + (x[..., 0] * y[..., 0] + x[..., 1] * y[..., 1] + x[..., 2] * y[..., 2])
-    return total + rest
+    return two_sum(total, rest)
 
 
 def cross(a: Floats, b: Floats) -> list[Floats]:
@@ -53,6 +62,17 @@ def cross(a: Floats, b: Floats) -> list[Floats]:
         total, lost = two_sum(first, -second)
         components.append(total + (lost + (first_low - second_low)))
     return components
+
+
+def scaled_offsets(center: Floats, points: Floats, size: float) -> tuple[Floats, Floats, Floats]:
+    """``center - points`` (3, N), what rounding took from it (3, N), and the powers of two (N,) that both are scaled by.
+
+    The larger one of offset and `size` becomes about 1, so that no square of a length leaves the range of float64.
+    """
+    offset, low = two_sum(center[:, None], -points.T)
+    largest = np.maximum(np.abs(offset).max(axis=0), size)
+    scale = np.ldexp(1.0, np.clip(-np.frexp(largest)[1], -1000, 1000))
+    return offset * scale, low * scale, scale
 
 
 def _split(a: Floats) -> tuple[Floats, Floats]:

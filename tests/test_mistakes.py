@@ -1,6 +1,7 @@
 """What each mistake shows, where that is known by other reasoning than the package's."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ EMITTERS = {
     "disk": DISK,
     "rectangle": RECTANGLE,
     "sphere": SPHERE,
-    "polygon": Area(Polygon([[0, 0, 4], [0, 1, 4], [0.3, 0.3, 4], [1, 0, 4]]), [2.0]),
+    "polygon": Area(Polygon([[0, 1, 4], [0.3, 0.3, 4], [1, 0, 4], [0, 0, 4]]), [2.0]),
     "mesh": Area(Mesh([[0, 0, 4], [0, 1, 4], [1, 0, 4], [0, 0, 5]], [[0, 1, 2], [0, 2, 3]]), [2.0]),
 }
 AROUND = Receivers([[0, 0, 0], [0.2, 0.1, 0], [1, 1, 0]], [[0, 0, 1], [0.6, 0, 0.8], [-0.8, 0, 0.6]])
@@ -127,7 +128,7 @@ def test_a_sphere_cut_by_the_horizon_agrees_with_rings_of_directions(name, power
     pieces = [low, *sorted(set(kinks)), high]
     expected = sum(
         quad(lambda a: np.cos(a) ** power * np.sin(a) * ring(a), x, y, epsabs=1e-12, epsrel=1e-11, limit=200)[0]
-        for x, y in zip(pieces, pieces[1:], strict=False)
+        for x, y in pairwise(pieces)
     )
     tilted = Receivers([0, 0, 0], [np.sin(tilt), 0, np.cos(tilt)])
     np.testing.assert_allclose(shown(name, SPHERE, tilted), 2 * expected, rtol=1e-7, atol=1e-9)
@@ -360,11 +361,15 @@ def test_a_smooth_falloff_is_half_where_the_cosine_is_halfway():
 @pytest.mark.parametrize("mistake", MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_shows_on_every_emitter_that_it_applies_to_and_on_no_other(mistake):
     more = {"reflectance": 0.5} if mistake.needs_reflectance else {}
-    # Behind, beside and below the lights, close by and far off, so that something of each mistake can be seen.
+    # Behind, beside and below the lights, and within the cone of the spot, narrowed by whatever mistake.
     random = np.random.default_rng(5)
-    normals = random.normal(size=(30, 3))
+    normals = random.normal(size=(34, 3))
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    everywhere = Receivers(np.array([0, 0, 3]) + 4 * random.normal(size=(30, 3)), normals)
+    points = np.array([0, 0, 3]) + 4 * random.normal(size=(34, 3))
+    for index, angle in enumerate((0.01, 0.2, 0.45, 0.6)):
+        points[index] = at_angle(angle, 1.5).points
+        normals[index] = [0.6, 0, 0.8]
+    everywhere = Receivers(points, normals)
     seen = 0
     for emitter in EMITTERS.values():
         if not applies(mistake, emitter):
@@ -374,7 +379,7 @@ def test_a_mistake_shows_on_every_emitter_that_it_applies_to_and_on_no_other(mis
         seen += 1
         wrong, right = mistaken_irradiance(mistake, emitter, everywhere, **more), irradiance(emitter, everywhere)
         assert np.isfinite(wrong.value).all()
-        assert wrong.value.shape == wrong.error.shape == (30, 1)
+        assert wrong.value.shape == wrong.error.shape == (34, 1)
         if mistake.name != "horizon subtracted":
             assert (wrong.value >= -wrong.error).all()
         changed = np.abs(wrong.value - right.value) > 1e-3 * right.value + wrong.error + right.error

@@ -225,6 +225,15 @@ def test_triangles_of_a_polygon_cover_it_once(seed):
     assert all(part.normal @ polygon.normal > 0.999999 for part in parts)
 
 
+def test_a_diagonal_through_another_corner_is_no_side_of_a_triangle():
+    # The diagonal of the L's bars passes through its inner corner, but for rounding.
+    ell = np.array([[-1, -1], [1, -1], [1, -0.25], [0, 0], [0.25, 1], [-1, 1]])
+    for angle in np.linspace(0, 6, 100):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        polygon = Polygon(np.column_stack([ell @ turn.T, np.zeros(6)]))
+        assert sum(Polygon(part).area for part in convex_parts(polygon)) == pytest.approx(polygon.area, rel=1e-12)
+
+
 # ------------------------------------------------------------------------------------------------- shadow rays
 
 

@@ -9,6 +9,8 @@ import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, get_args
 
@@ -22,6 +24,7 @@ from graders.errors import UsageError
 from oracle.arrays import InvalidArgument
 from oracle.truth import Answer
 from oracle.truth.fields import require_unit
+from oracle.truth.solid_angle import SolidShape
 from oracle.truth.things import Emitter
 from reference_scenes.loading import suggest
 
@@ -84,9 +87,11 @@ _RECEIVER = {
         ("receiver", "normal"), "0,0,1", is_direction=True, help="the receiver's normal, of any length"
     ),
 }
+_POINT = {"point": Parameter(("point",), "0,0,0", help="where it is seen from; m")}
 QUESTIONS = {
     # A map has more texels than a command line has room for.
     "irradiance": Question("irradiance", "emitter", _kinds(Emitter, "map"), _RECEIVER, takes_occluders=True),
+    "solid-angle": Question("solid_angle", "shape", _kinds(SolidShape), _POINT),
 }
 
 
@@ -247,15 +252,13 @@ def _swept(sweep: Sweep, parameters: dict[str, Parameter]) -> tuple[str, int | N
     return name, _AXES[component]
 
 
-def _put_swept(
-    case: dict[str, Any], parameters: dict[str, Parameter], swept: tuple[str, int | None], value: float
-) -> None:
+def _put_swept(case: Any, parameters: dict[str, Parameter], swept: tuple[str, int | None], value: float) -> None:
     name, component = swept
     path = parameters[name].path
     if component is None:
         _put(case, path, value)
         return
-    vector = case[path[0]][path[1]]
+    vector = reduce(getitem, path, case)
     if not isinstance(vector, list) or len(vector) != 3:
         raise UsageError(f"--table: {name} is no vector X,Y,Z")
     vector[component] = value

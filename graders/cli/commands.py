@@ -174,6 +174,14 @@ def irradiance() -> None:
     """
 
 
+@oracle.group("solid-angle", cls=_Kinds, subcommand_metavar="SHAPE [OPTIONS]", short_help="Solid angle of a shape.")
+def solid_angle() -> None:
+    """Compute the solid angle of a shape: value, unit, error bound, formula and source.
+
+    For example: oracle solid-angle sphere --center 0,0,2 --radius 0.5, or with --table center.z=1:100:20log.
+    """
+
+
 @oracle.command(short_help="Tell what this installation can do.")
 @_JSON
 def doctor(as_json: bool) -> int:

@@ -17,6 +17,7 @@ _AT_ONCE = 1 << 20
 # One value of a stream may take so many characters; memory stays bounded even if a quotation mark is missing.
 _LARGEST_VALUE = 1 << 26
 _BLANK = re.compile(r"[ \t\r\n]*")
+_AFTER_VALUE = tuple(",] \t\r\n")
 _BYTE_ORDER_MARK = codecs.BOM_UTF8
 
 
@@ -220,8 +221,9 @@ class _ListReader:
                 raise self._broken(self._position, "the list does not end") from None
         except RecursionError:
             raise self._broken(self._position, "nested too deeply") from None
-        # A number might go on.
-        return (value, end) if self._ended or end < len(text) else None
+        # A number might go on, at most with what is no delimiter yet: 1 in "1.", or in "1e-".
+        goes_on = not self._ended and end > len(text) - 16 and text[end : end + 1] not in _AFTER_VALUE
+        return None if goes_on else (value, end)
 
     def _read(self) -> None:
         """Drop what was taken and read on: at least as much as is left, so that a long value is not tried often."""

@@ -52,7 +52,7 @@ def run_truth(path: Path) -> None:
         except OSError as error:
             raise UsageError(f"{source}: {error.strerror or error}") from None
     if complaints:
-        more = f" (and {complaints - 1} more)" if complaints > 1 else ""
+        more = f"; {complaints - 1} more without an answer" if complaints > 1 else ""
         raise UsageError(first_complaint + more)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from oracle.arrays import Booleans, Floats
 from oracle.bounded import Bounded
-from oracle.compensated import cross, dot, two_sum
+from oracle.compensated import cross, dot, scaled_offsets
 from oracle.irradiance.segment import Segment, segment
 from oracle.shapes import Disk
 
@@ -42,12 +42,9 @@ def disk(shape: Disk, points: Floats, normals: Floats, two_sided: bool) -> Bound
     Radiation Heat Transfer Configuration Factors] added as components of a vector, with all differences of roots
     rationalised. H, n.o and X are computed in twice the precision. `segment` treats disks that the horizon cuts.
     """
-    # Scaled by a power of two, which rounds nothing, so that no square leaves the range of float64.
     n = np.ascontiguousarray(normals.T)
-    offset, low = two_sum(shape.center[:, None], -points.T)
-    largest = np.maximum(np.abs(offset).max(axis=0), shape.radius)
-    scale = np.ldexp(1.0, np.clip(-np.frexp(largest)[1], -1000, 1000))
-    offset, low, radius = offset * scale, low * scale, shape.radius * scale
+    offset, low, scale = scaled_offsets(shape.center, points, shape.radius)
+    radius = shape.radius * scale
 
     height = dot(shape.normal, 0.0, offset.T, low.T)
     shines = height != 0 if two_sided else height < 0
@@ -67,6 +64,8 @@ def disk(shape: Disk, points: Floats, normals: Floats, two_sided: bool) -> Bound
     # Rounding; the cosine's is absolute; and what is lost although computed in twice the precision.
     error = 8 * _EPSILON * (np.abs(first) + np.abs(second) + weight * q)
     error += 8 * _EPSILON**2 * (weight * (height + np.abs(above)) + np.abs(value) / s)
+    # On the rim, as far as these numbers can tell, every value is possible.
+    error = np.where(s < 1e4 * _EPSILON**2, np.pi, error)
 
     wx, wy, wz = shape.normal
     sine = np.sqrt((n[1] * wz - n[2] * wy) ** 2 + (n[2] * wx - n[0] * wz) ** 2 + (n[0] * wy - n[1] * wx) ** 2)
@@ -112,5 +111,7 @@ def _cut(
                 power=power[is_cut],
             )
         )
-        value[is_cut], error[is_cut] = part.value, part.error
+        # Of a sliver, as much of its width is uncertain as the chord's position.
+        sliver = 4 * _EPSILON * radius[is_cut] / (radius[is_cut] + middle)
+        value[is_cut], error[is_cut] = part.value, part.error + sliver * part.value
     result.value[cut], result.error[cut] = value, error

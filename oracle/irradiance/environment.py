@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oracle import compensated
 from oracle.arrays import Booleans, Floats, Integers
 from oracle.arrays import dot as inner
 from oracle.bounded import Bounded
@@ -14,7 +15,7 @@ from oracle.emitters import Constant, CosineSky, Equirectangular
 _EPSILON = float(np.finfo(np.float64).eps)
 
 # Rounding errors of one texel's integral, relative to its solid angle; the largest found was a tenth of this.
-_ROUNDINGS = 32 * _EPSILON
+_ROUNDINGS = 16 * _EPSILON
 
 # Texels are halved until they are at most so wide and high [rad]; then nodes of Gauss's quadrature reach float64's
 # precision along every edge of a texel that the horizon cuts, where no direction is further above it than this.
@@ -39,18 +40,19 @@ def cosine_sky(emitter: CosineSky, normals: Floats) -> Bounded:
     With b the angle between normal and `up`, the visible half of the sky is a lune, over which the cosine integrates to
     ``a = pi (1 + cos b) / 2`` and the product of both cosines to ``s = 2/3 ((pi - b) cos b + sin b)``, so that
     ``E = horizon (a - s) + zenith s``. For the CIE overcast sky this is its known tilted-plane irradiance
-    ``zenith (pi (1 + cos b) / 6 + 4/9 ((pi - b) cos b + sin b))`` [Moon and Spencer 1942 for b = 0]. The angle is right
-    to a few ulp of 1; the error is more than that of the value where the receiver faces straight down.
+    ``zenith (pi (1 + cos b) / 6 + 4/9 ((pi - b) cos b + sin b))`` [Moon and Spencer 1942 for b = 0]. The error is a few
+    ulp of the value, also for receivers that face the ground and see but a sliver of the sky.
     """
-    sine = np.linalg.norm(np.cross(normals, emitter.up), axis=-1)
+    cross = compensated.cross(normals, np.broadcast_to(emitter.up, normals.shape))
+    sine = np.hypot(np.hypot(cross[0], cross[1]), cross[2])
     # The angle of the lune that is visible, pi - b.
     lune = np.arctan2(sine, -(normals @ emitter.up))
     plain = np.pi * np.sin(lune / 2) ** 2
     squared = 2 / 3 * _sine_minus_product(lune)
     value = _outer(plain - squared, emitter.horizon) + _outer(squared, emitter.zenith)
-    # The sine is right to 4 ulp of 1; both integrals change by less than pi/2 sin(b) + lune sin(b) with the angle.
-    turned = 4 * _EPSILON * np.minimum(np.sin(lune) + 4 * _EPSILON, 1) * (np.pi / 2 + lune)
-    return Bounded(value, 8 * _EPSILON * value + _outer(turned, np.maximum(emitter.horizon, emitter.zenith)))
+    # The sine is right to an ulp and 1e-31; the integrals grow with the square and cube of a narrow lune.
+    turned = _EPSILON**2 * 8 * (lune + _EPSILON**2)
+    return Bounded(value, 16 * _EPSILON * value + _outer(turned, emitter.horizon + emitter.zenith))
 
 
 def equirectangular(emitter: Equirectangular, normals: Floats) -> Bounded:
@@ -102,6 +104,24 @@ def _angle_minus_sine(angle: float) -> float:
     """``x - sin(x)`` for 0 <= x <= 0.2."""
     squared = angle * angle
     return angle * squared / 6 * (1 - squared / 20 * (1 - squared / 42 * (1 - squared / 72 * (1 - squared / 110))))
+
+
+def sky_vector(emitter: CosineSky) -> Bounded:
+    """Vector irradiance of a sky, shape (3, C): ``pi (horizon + 2 zenith) / 3`` along `up`."""
+    value = emitter.up[:, None] * (np.pi / 3 * (emitter.horizon + 2 * emitter.zenith))
+    return Bounded(value, 8 * _EPSILON * np.abs(value))
+
+
+def map_vector(emitter: Equirectangular) -> Bounded:
+    """Vector irradiance of a map, shape (3, C): the sum of radiance times the integral of the direction over texels."""
+    texels = Texels.of(emitter)
+    columns = texels.radiance.shape[1]
+    around = np.stack([*texels.directions, np.full(columns, texels.azimuth[1])])
+    by_row = (around @ texels.radiance) * np.stack([texels.across, texels.across, texels.upwards], axis=1)[..., None]
+    fluence = np.ascontiguousarray((texels.solid_angles[:, None] * texels.radiance.sum(axis=1)).T).sum(axis=-1)
+    frame = np.stack([emitter.front, np.cross(emitter.up, emitter.front), emitter.up])
+    value = frame.T @ np.ascontiguousarray(by_row.transpose(1, 2, 0)).sum(axis=-1)
+    return Bounded(value, np.broadcast_to((columns + 60) * _EPSILON * fluence, value.shape))
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 _AT_ONCE = 16
 
 # Kinks and ends where the integrand vanishes or breaks like a power are approached down to here.
-_KINK = 1e-6
+_KINK = 1e-7
 
 
 def directional_reflectance(material: Material, cosine: ArrayLike) -> Bounded:
@@ -110,10 +110,14 @@ def average_albedo(material: Material) -> Bounded:
     InvalidArgument
         If the roughness is anisotropic, or shapes do not fit together.
     """
-    alpha, _, near, far, k = _checked(material, 1.0)
-    critical = np.where((k == 0) & (far < near), np.arccos(np.minimum(far / near, 1.0)), np.pi / 2)
-    places = np.stack([np.zeros_like(alpha), critical, np.full_like(alpha, np.pi / 2)], axis=-1)
-    scales = np.broadcast_to(np.minimum(alpha, 0.5)[..., None], places.shape)
+    alpha, _, near, far, _ = _checked(material, 1.0)
+    zero, right = np.zeros_like(alpha), np.full_like(alpha, np.pi / 2)
+    # Albedos have no derivative of some order along the surface, and where the critical angle comes into play.
+    critical = right
+    if isinstance(material, RoughDielectric):
+        critical = np.arccos(np.minimum(near, far) / np.maximum(near, far))
+    places = np.stack([zero, critical, right], axis=-1)
+    scales = np.stack([zero + _KINK, np.minimum(alpha, 1e-2), np.minimum(alpha, 0.1 / alpha)], axis=-1)
     averages = []
     for order in (FINE, COARSE):
         origins, offsets, weights = between(places, scales, order, 2.0)
@@ -130,18 +134,21 @@ def _reflection(
     material: Material, order: int, alpha: Floats, chi: Floats, near: Floats, far: Floats, k: Floats
 ) -> Floats:
     """Integral over the elevation of what is reflected; `chi` is the co-angle of incidence. All of shape (N,)."""
+    panel = panel_of(material.distribution)
     zero, scale = np.zeros_like(chi), np.minimum(alpha, np.sin(chi))
-    places, scales = [zero, chi, zero + np.pi / 2], [scale, scale, zero + 1]
+    # Beckmann's masking falls off like exp(-1/(a theta)^2) towards the normal, which is smooth but hard to integrate.
+    upright = np.minimum(1.0, 0.1 / alpha)
+    places, scales = [zero, chi, zero + np.pi / 2], [scale, np.minimum(scale, upright), upright]
     if (far < near).any() and not isinstance(material, RoughConductor):
         # The curve of half vectors at the critical angle begins and ends in the plane of incidence.
         critical = np.where(far < near, np.arccos(np.minimum(far / near, 1.0)), 0.0)
         theta = np.pi / 2 - critical
         places += [2 * critical - chi, chi + 2 * theta, chi - 2 * theta]
         scales += [zero + _KINK] * 3
-    at, weights, of = _elevations(material, alpha, chi, zero, zero + np.pi / 2, places, scales, order)
+    at, weights, of = _elevations(material, alpha, chi, zero, zero + np.pi / 2, places, scales, order, panel)
     mirrors = isinstance(material, RoughMirror)
     lobe = mirrored(at) if mirrors else reflected(at, near[of], far[of], k[of], order)
-    return np.bincount(of, lobe * weights, len(chi))
+    return np.bincount(of, lobe * weights, len(chi)).astype(np.float64)
 
 
 def _transmission(
@@ -159,9 +166,10 @@ def _transmission(
     narrow = np.maximum(np.minimum(scale, alpha * tilt / far), 1e-9)
     # Where the last azimuth becomes possible.
     full = np.pi - most - chi
+    panel = panel_of(material.distribution) / 2
     places, scales = [low, high, peak, full], [scale, scale, narrow, scale]
-    at, weights, of = _elevations(material, alpha, chi, low, high, places, scales, order)
-    return np.bincount(of, transmitted(at, near[of], far[of], order) * weights, len(chi))
+    at, weights, of = _elevations(material, alpha, chi, low, high, places, scales, order, panel)
+    return np.bincount(of, transmitted(at, near[of], far[of], order) * weights, len(chi)).astype(np.float64)
 
 
 def _refracted(chi: Floats, near: Floats, far: Floats) -> tuple[Floats, Floats]:
@@ -180,6 +188,7 @@ def _elevations(
     places: list[Floats],
     scales: list[Floats],
     order: int,
+    panel: float,
 ) -> tuple[Elevations, Floats, Integers]:
     """Nodes from `low` to `high`, graded towards `places` and there as fine as `scales`; places in any order.
 
@@ -188,7 +197,7 @@ def _elevations(
     stacked = np.clip(np.stack(places, axis=-1), low[:, None], high[:, None])
     sorting = np.argsort(stacked, axis=-1)
     ordered, fine = (np.take_along_axis(a, sorting, axis=-1) for a in (stacked, np.stack(scales, axis=-1)))
-    origins, offsets, weights = between(ordered, fine, order, panel_of(material.distribution))
+    origins, offsets, weights = between(ordered, fine, order, panel)
     # Places outside the range have become intervals without length.
     of, node = np.nonzero(weights)
     origin, offset = origins[of, node], offsets[of, node]

@@ -163,7 +163,7 @@ def refract(directions: ArrayLike, normals: ArrayLike, eta: ArrayLike) -> Floats
     c, near, far = _sides(cosine, eta)
     found = interface(c, np.zeros_like(c), near, far, np.zeros_like(c))
     ratio = near / far
-    along = np.copysign(ratio * c - found.q.real / far, cosine)
+    along = np.where(cosine >= 0, 1.0, -1.0) * (ratio * c - found.q.real / far)
     result: Floats = along[..., None] * n - ratio[..., None] * w
     result[~(found.q.real > 0)] = 0
     return result

@@ -19,7 +19,7 @@ from oracle.reflection.microfacet import GGX, Distribution, covered, projected_a
 
 def panel_of(distribution: Distribution) -> float:
     """Length of quadrature panels: a Gaussian has no poles, but grows in imaginary directions."""
-    return 2.0 if isinstance(distribution, GGX) else 0.8
+    return 2.0 if isinstance(distribution, GGX) else 1.0
 
 
 @dataclass(frozen=True, eq=False)

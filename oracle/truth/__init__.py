@@ -19,16 +19,19 @@ from oracle.truth.interfaces import (
     SlabReflectance,
     SlabTransmittance,
 )
-from oracle.truth.light import Irradiance, ProjectedSolidAngle
+from oracle.truth.light import Irradiance, VectorIrradiance
 from oracle.truth.lobes import PhongAlbedo, PhongRadiance
 from oracle.truth.media import AttenuatedIrradiance, ScatteredRadiance, Transmittance
 from oracle.truth.microfacets import MicrofacetAlbedo, MicrofacetAverageAlbedo
+from oracle.truth.solid_angle import ProjectedSolidAngle, SolidAngle
 from oracle.truth.view_factor import ViewFactor
 
 __all__ = ["KINDS", "Answer", "AnyCase", "Case", "InvalidField", "Law", "evaluate"]
 
 AnyCase: TypeAlias = Annotated[
     Irradiance
+    | VectorIrradiance
+    | SolidAngle
     | ProjectedSolidAngle
     | ViewFactor
     | ClosedBox

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ import numpy as np
 
 from oracle.arrays import InvalidArgument
 from oracle.bounded import Bounded
-from oracle.truth.case import Case, Law
+from oracle.truth.case import Case, InvalidField, Law
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +56,18 @@ def _together(cases: list[Case]) -> list[Answer | InvalidArgument]:
         if len(cases) > 1:
             half = len(cases) // 2
             return _together(cases[:half]) + _together(cases[half:])
-        return [error if isinstance(error, InvalidArgument) else InvalidArgument("leaves the range of float64")]
+        return [_complaint(error)]
     return _answers(cases[0], found)
+
+
+def _complaint(error: Exception) -> InvalidArgument:
+    """What is wrong with a single case."""
+    if isinstance(error, InvalidField):
+        return error
+    if isinstance(error, InvalidArgument):
+        # The case knows nothing of the array of one receiver, or one cosine, that it became.
+        return InvalidArgument(re.sub(r"^(\w+)\[0\]", r"\1", str(error)))
+    return InvalidArgument("leaves the range of float64")
 
 
 def _answers(case: Case, found: Bounded) -> list[Answer | InvalidArgument]:

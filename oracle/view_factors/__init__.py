@@ -59,8 +59,8 @@ def view_factor(source: Shape | Receivers, target: Shape) -> Bounded:
 def view_factors(sources: Sequence[Shape], targets: Sequence[Shape]) -> Bounded:
     """View factors from each of S sources to each of T targets, shape (S, T); see `view_factor`.
 
-    Many rectangles with parallel edges are fast, less than a microsecond for each pair. Nothing hides anything: for the
-    inside of a convex enclosure these are the matrix of its radiosity equation.
+    Many rectangles with parallel edges take some microseconds for each pair, other polygons milliseconds. Nothing hides
+    anything: for the inside of a convex enclosure this is the matrix of its radiosity equation.
     """
     if not len(sources) or not len(targets):
         raise InvalidArgument(f"{'targets' if len(sources) else 'sources'} is an empty sequence")

@@ -25,10 +25,19 @@ _AT_ONCE = 32768
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """The part of a polygon that faces another one: vertices (N, 3) and the front's unit normal."""
+    """The part of a polygon that faces another one.
 
-    vertices: Floats
+    An origin (3,), vertices relative to it (N, 3), so that the shape of a small and distant polygon keeps its digits,
+    and the front's unit normal.
+    """
+
+    origin: Floats
+    relative: Floats
     normal: Floats
+
+    @property
+    def vertices(self) -> Floats:
+        return self.origin + self.relative
 
     @property
     def middle(self) -> Floats:
@@ -38,7 +47,7 @@ class _Side:
     @property
     def radius(self) -> float:
         """Of a ball around the middle that holds all vertices."""
-        return float(np.linalg.norm(self.vertices - self.middle, axis=1).max())
+        return float(np.linalg.norm(self.relative - self.relative.mean(axis=0), axis=1).max())
 
 
 def exchange_area(first: Polygon, second: Polygon) -> tuple[float, float]:
@@ -52,15 +61,15 @@ def exchange_area(first: Polygon, second: Polygon) -> tuple[float, float]:
     turns it into ``A1 F12 = 1/(2 pi) sum_ij d_i . e_j int int log r ds dt`` over all pairs of edges [Lambert 1760;
     Schroeder and Hanrahan 1993], here with the inner integral in closed form.
     """
-    # Differences of nearby coordinates are exact, however far from the origin they are.
-    origin = first.vertices[0]
-    a = _Side(first.vertices - origin, first.normal)
-    b = _Side(second.vertices - origin, second.normal)
-    scale = float(np.abs(np.concatenate([a.vertices, b.vertices])).max())
-    a, b = (_Side(side.vertices / scale, side.normal) for side in (a, b))
+    # A power of 2, by which one divides without loss.
+    extent = max(np.abs(second.vertices - first.vertices[0]).max(), np.abs(first.vertices - first.vertices[0]).max())
+    scale = 2.0 ** np.ceil(np.log2(extent))
+    a, b = (
+        _Side((one.vertices[0] - first.vertices[0]) / scale, (one.vertices - one.vertices[0]) / scale, one.normal)
+        for one in (first, second)
+    )
     facing_a, facing_b = _in_front(a, b), _in_front(b, a)
     if facing_a is None or facing_b is None:
-        # Rounding may have hidden what rises by as much as this above the other's plane.
         return 0.0, 0.0
     distance = float(np.linalg.norm(facing_a.middle - facing_b.middle)) - facing_a.radius - facing_b.radius
     apart = distance / max(facing_a.radius, facing_b.radius)
@@ -72,7 +81,7 @@ def exchange_area(first: Polygon, second: Polygon) -> tuple[float, float]:
         # A small polygon's contours would cancel; the exact irradiance that it receives is smooth over it.
         dwarfed = small.radius < _SMALL * large.radius and clear >= APART
         value, error = _by_irradiance(small, large, clear) if dwarfed else _by_contours(facing_a, facing_b)
-    return max(value, 0.0) * scale**2, error * scale**2
+    return max(value, 0.0) * float(scale**2), error * float(scale**2)
 
 
 def _in_front(side: _Side, other: _Side) -> _Side | None:
@@ -93,11 +102,11 @@ def _in_front(side: _Side, other: _Side) -> _Side | None:
     corners = []
     for i, j in zip(range(len(heights)), [*range(1, len(heights)), 0], strict=True):
         if heights[i] >= 0:
-            corners.append(side.vertices[i])
+            corners.append(side.relative[i])
         if heights[i] * heights[j] < 0:
             along = heights[i] / (heights[i] - heights[j])
-            corners.append(side.vertices[i] + along * (side.vertices[j] - side.vertices[i]))
-    return _Side(np.array(corners), side.normal)
+            corners.append(side.relative[i] + along * (side.relative[j] - side.relative[i]))
+    return _Side(side.origin, np.array(corners), side.normal)
 
 
 # ---------------------------------------------------------------------------------------------- over the areas
@@ -127,7 +136,7 @@ def _over_fan(side: _Side, count: int) -> tuple[Floats, Floats]:
     t, w = gauss(count)
     t, w = (1 + t) / 2, w / 2
     origin = side.vertices[0]
-    b, c = side.vertices[1:-1] - origin, side.vertices[2:] - origin
+    b, c = side.relative[1:-1] - side.relative[0], side.relative[2:] - side.relative[0]
     doubled = np.cross(b, c) @ side.normal
     along, across = t[:, None], t[None, :]
     points = origin + along[None, ..., None] * (b[:, None, None] + across[None, ..., None] * (c - b)[:, None, None])
@@ -187,7 +196,7 @@ def _by_contours(a: _Side, b: _Side) -> tuple[float, float]:
 
 def _edges(side: _Side) -> tuple[Floats, Floats, Floats]:
     """Starts (N, 3), unit directions (N, 3) and lengths (N,) of the edges that have a length."""
-    vectors = np.roll(side.vertices, -1, axis=0) - side.vertices
+    vectors = np.roll(side.relative, -1, axis=0) - side.relative
     lengths = np.linalg.norm(vectors, axis=1)
     kept = lengths > 0
     return side.vertices[kept], vectors[kept] / lengths[kept, None], lengths[kept]

@@ -75,8 +75,10 @@ def _best_ear(flat: Floats, turns: Floats) -> int:
         return int((turns == 0).argmax())
 
     def side(start: Floats, end: Floats) -> Floats:
-        """side[i, j]: on which side of the line from start[i] to end[i] vertex j lies."""
-        return _cross((end - start)[:, None], flat[None] - start[:, None])
+        """side[i, j]: on which side of the line from start[i] to end[i] vertex j lies; rounding errors are 0."""
+        sides = _cross((end - start)[:, None], flat[None] - start[:, None])
+        noise = 8 * np.finfo(np.float64).eps * np.abs(flat).max() * np.abs(end - start).sum(axis=1)
+        return np.where(np.abs(sides) <= noise[:, None], 0.0, sides)
 
     sides = np.stack([side(before, flat), side(flat, after), side(after, before)])
     corner = np.zeros(sides.shape[1:], dtype=np.bool_)

@@ -1,8 +1,8 @@
 """Irradiance of disks against the definition as a contour integral, in ball arithmetic.
 
 Directions omega above the horizon, weighted with n . omega, are what their projection along n covers of the unit disk
-around the receiver [Nusselt 1928]. That area is half the integral of n . (omega x d omega) along its boundary: here along
-the disk's rim, by rigorous quadrature of n . (V x dV) / |V|^2, and along the horizon, where it is an angle.
+around the receiver [Nusselt 1928]. That area is half the integral of n . (omega x d omega) along its boundary: here
+along the disk's rim, by rigorous quadrature of n . (V x dV) / |V|^2, and along the horizon, where it is an angle.
 """
 
 import math
@@ -11,9 +11,6 @@ import numpy as np
 from flint import arb
 from hypothesis import strategies as st
 from verification import Form
-
-from oracle import emitters, shapes
-from oracle.irradiance import irradiance
 from verified.geometry import (
     ball,
     balls,
@@ -24,7 +21,6 @@ from verified.geometry import (
     frame,
     integral,
     minus,
-    norm,
     number,
     plus,
     powers_of_ten,
@@ -32,6 +28,9 @@ from verified.geometry import (
     times,
     unit,
 )
+
+from oracle import emitters, shapes
+from oracle.irradiance import irradiance
 
 
 def covered(center, u, v, radius, normal):
@@ -50,7 +49,12 @@ def covered(center, u, v, radius, normal):
     half = (-middle / reach).acos() if cut else arb.pi()
     first, last = highest - half, highest + half
     cu, cv, squared = dot(center, u), dot(center, v), dot(center, center) + radius * radius
-    swing = 2 * radius * (cu * cu + cv * cv).sqrt()
+    # Nothing on the axis, as far as these digits tell.
+    aside = cu * cu + cv * cv
+    swing = 2 * radius * aside.sqrt() if aside > 0 else arb(0)
+    if not squared > swing:
+        # On the rim, where there is no limit.
+        return arb("nan")
     # Angles f count from where the rim is nearest to the receiver and the integrand may be nearly singular.
     nearest = arb.atan2(cv, cu) + arb.pi() if swing > 0 else arb(0)
     cosine, sine = nearest.cos(), nearest.sin()
@@ -144,6 +148,6 @@ def near_the_rim(draw):
 
 
 FORMS = [
-    Form("disk, anywhere", placed(receivers()), computed, exact),
-    Form("disk, receiver next to the rim", placed(near_the_rim()), computed, exact, share=0.1),
+    Form("disk, anywhere", placed(receivers()), computed, exact, share=0.005),
+    Form("disk, receiver next to the rim", placed(near_the_rim()), computed, exact, share=0.5),
 ]

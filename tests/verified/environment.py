@@ -126,8 +126,8 @@ def exact_map(configuration):
     x, y, upright = dot(n, f), dot(n, cross(u, f)), dot(n, u)
     rows, columns = radiance.shape
     polar = [arb.pi() * i / rows for i in range(rows + 1)]
-    flat = (x * x + y * y).sqrt()
-    turn = arb.atan2(y, x) if flat > 0 else arb(0)
+    squared = x * x + y * y
+    flat, turn = (squared.sqrt(), arb.atan2(y, x)) if squared > 1e-60 else (arb(0), arb(0))
 
     kinks = [turn + arb.pi() / 2, turn - arb.pi() / 2]
     if upright != 0 and flat > 0:
@@ -185,8 +185,8 @@ def computed_map(configuration):
 
 @st.composite
 def maps(draw):
-    """Up to 3 x 4 texels, of which a few may be a million times as bright as others."""
-    rows, columns = draw(st.integers(1, 3)), draw(st.integers(1, 4))
+    """Up to 3 x 2 texels, of which a few may be a million times as bright as others."""
+    rows, columns = draw(st.integers(1, 3)), draw(st.integers(1, 2))
     exponents = draw(st.lists(between(-3, 3), min_size=rows * columns, max_size=rows * columns))
     radiance = 10.0 ** np.array(exponents).reshape(rows, columns)
     up = draw(directions())
@@ -205,6 +205,6 @@ FORMS = [
         computed_constant,
         exact_constant,
     ),
-    Form("irradiance of skies", skies(), computed_sky, exact_sky, share=0.05),
-    Form("irradiance of maps", maps(), computed_map, exact_map, share=0.02),
+    Form("irradiance of skies", skies(), computed_sky, exact_sky),
+    Form("irradiance of maps", maps(), computed_map, exact_map),
 ]

@@ -10,11 +10,23 @@ import numpy as np
 from flint import arb
 from hypothesis import strategies as st
 from verification import Form
+from verified.geometry import (
+    balls,
+    between,
+    directions,
+    dot,
+    frame,
+    integral,
+    minus,
+    norm,
+    number,
+    powers_of_ten,
+    times,
+    unit,
+)
 
 from oracle.emitters import Line, Receivers
 from oracle.irradiance import irradiance
-from verified.geometry import ball, balls, between, directions, dot, frame, integral, minus, norm, number, powers_of_ten
-from verified.geometry import times, unit
 
 
 def exact(configuration):

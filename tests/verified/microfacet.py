@@ -5,11 +5,11 @@ import math
 import numpy as np
 from flint import arb
 from hypothesis import strategies as st
-from oracle.reflection.rough import RoughConductor, RoughDielectric, bsdf
 from verification import Form
 from verified.fresnel import by_amplitudes, exactly, take
-from verified.geometry import balls, between, dot, integral, plus, powers_of_ten, times, unit
+from verified.geometry import balls, between, dot, integral, number, plus, powers_of_ten, times, unit
 
+from oracle.reflection.albedo import directional_albedo
 from oracle.reflection.microfacet import (
     GGX,
     Beckmann,
@@ -18,6 +18,7 @@ from oracle.reflection.microfacet import (
     normal_density,
     visible_normal_density,
 )
+from oracle.reflection.rough import RoughConductor, RoughDielectric, RoughMirror, bsdf
 
 ALPHAS = st.one_of(between(0.05, 1), powers_of_ten(-3, 0.5))
 
@@ -171,9 +172,70 @@ def dielectric(configuration, separable):
     return c * d / abs(i[2] * o[2]) * jacobian * passed * g * density(distribution, h)
 
 
+GAUSS = [arb.legendre_p_root(24, k, weight=True) for k in range(24)]
+
+
+def mirrored_part(kind, alpha, cosine, separable):
+    """Directional albedo of mirrors: the BRDF over azimuth by residues or Bessel functions, then over the angle.
+
+    Proven quadrature would cost seconds; this is Gauss's in 38 digits, in steps that grow from the smallest feature on,
+    away from the mirrored direction and from the horizon. It agrees with the proven digits wherever those were found.
+    """
+    c, a2 = arb(cosine), arb(alpha) ** 2
+    s = (1 - c * c).sqrt()
+    distribution = kind, alpha, alpha
+    area = c * (1 + shadow(distribution, (s, arb(0), c)))
+
+    def leaving(angle):
+        z, s_o = angle.cos(), angle.sin()
+        area_o = z * (1 + shadow(distribution, (s_o, arb(0), z)))
+        seen = area * area_o if separable else area * z + area_o * c - c * z
+        p, q = 2 + 2 * c * z, 2 * s * s_o
+        if kind is Beckmann:
+            # D = (p + q cos)^2 exp(-e - k cos) / (pi a^2 h^4), and exp(-k cos) has the moments I0, -I1, I0 - I1/k.
+            width = a2 * (c + z) ** 2
+            k = q / width
+            zeroth, first = k.bessel_i(0, scaled=True), k.bessel_i(1, scaled=True)
+            azimuths = p * p * zeroth - 2 * p * q * first + q * q * (zeroth - first / k)
+            return z * s_o * azimuths * (k - (s * s + s_o * s_o) / width).exp() / (2 * a2 * seen * (c + z) ** 4)
+        # D = ((p + q cos) / (u + v cos))^2 / (pi a^2), and p + q cos = a^2 (u + v cos) + rest.
+        u, v = (s * s + s_o * s_o) / a2 + (c + z) ** 2, q / a2
+        rest = p - a2 * u
+        product = u * u - v * v
+        root = product.sqrt()
+        azimuths = a2 * a2 + 2 * a2 * rest / root + rest * rest * u / (product * root)
+        return z * s_o * azimuths / (2 * a2 * seen)
+
+    theta, right, small = c.acos(), arb.pi() / 2, arb(min(alpha, cosine))
+    lower, upper, normal = theta / 2, (theta + right) / 2, arb(min(1, 0.05 / alpha))
+    total = arb(0)
+    for start, end, scale in (
+        (theta, lower, min(small, normal)),
+        (theta, upper, min(small, normal)),
+        (right, upper, small),
+        (arb(0), lower, normal),
+    ):
+        sign = 1 if end > start else -1
+        last = (abs(end - start) / scale).asinh()
+        panels = max(1, math.ceil(float(last) / (2 if kind is GGX else 0.5)))
+        half = last / (2 * panels)
+        for panel in range(panels):
+            for node, weight in GAUSS:
+                x = (2 * panel + 1 + node) * half
+                total += leaving(start + sign * scale * x.sinh()) * x.cosh() * (weight * half * scale)
+    return total
+
+
 def made(distribution):
     kind, alpha, alpha_y = distribution
     return kind(alpha, alpha_y)
+
+
+@st.composite
+def grazing_or_not(draw):
+    """Roughness down to 1e-3 and angles up to 89.99 degrees."""
+    cosine = draw(st.one_of(between(0.01, 1), powers_of_ten(-3.7, 0)))
+    return draw(st.sampled_from([GGX, Beckmann])), draw(ALPHAS), min(cosine, 1 - 1e-9), draw(st.booleans())
 
 
 SINGLE = st.tuples(distributions(), above())
@@ -210,6 +272,13 @@ FORMS = [
         take(lambda distribution, w, m: visible_normal_density(made(distribution), w, m)),
         exactly(visible_density),
         share=0.02,
+    ),
+    Form(
+        "albedo of rough mirrors",
+        grazing_or_not(),
+        take(lambda kind, alpha, c, separable: directional_albedo(RoughMirror(kind(alpha), separable), c)),
+        lambda configuration: number(mirrored_part(*configuration)),
+        share=0.01,
     ),
     Form(
         "rough conductor",

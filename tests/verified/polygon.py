@@ -145,8 +145,9 @@ def stars(draw):
     return placed(draw, np.column_stack([radii * np.cos(angles), radii * np.sin(angles), np.zeros(count)]))
 
 
+# Slivers above the horizon and emitters seen edge-on are ill-conditioned; needles of 1e-8 are both, often.
 FORMS = [
-    Form("irradiance of rectangles", rectangles(), computed, exact, share=0.05),
-    Form("irradiance of triangles", needles(), computed, exact, share=0.1),
-    Form("irradiance of polygons", stars(), computed, exact, share=0.05),
+    Form("irradiance of rectangles", rectangles(), computed, exact, share=0.1),
+    Form("irradiance of triangles", needles(), computed, exact, share=0.4),
+    Form("irradiance of polygons", stars(), computed, exact, share=0.12),
 ]
