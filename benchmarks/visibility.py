@@ -35,7 +35,7 @@ def main() -> None:
     points = np.column_stack([rng.uniform(-2, 2, (COUNT, 2)), np.zeros(COUNT)])
     receivers = Receivers(points, np.array([0.0, 0, 1]))
     triangles = [
-        Polygon(rng.uniform([-0.8, -0.8, 0.3], [0.8, 0.8, 0.7]) + 0.2 * rng.normal(size=(3, 3))) for _ in range(16)
+        Polygon(rng.uniform([-0.8, -0.8, 0.3], [0.8, 0.8, 0.7]) + 0.1 * rng.normal(size=(3, 3))) for _ in range(16)
     ]
     whole = projected_solid_angle(light, receivers).value
     print("| occluders | receivers in shadow | thousand receivers/s, median | best |")

@@ -65,7 +65,7 @@ def cross(a: Floats, b: Floats) -> list[Floats]:
 
 
 def scaled_offsets(center: Floats, points: Floats, size: float) -> tuple[Floats, Floats, Floats]:
-    """``center - points`` (3, N), what rounding took from it (3, N), and the powers of two (N,) that both are scaled by.
+    """``center - points`` and what rounding took from it, (3, N), scaled by powers of two (N,), which come last.
 
     The larger one of offset and `size` becomes about 1, so that no square of a length leaves the range of float64.
     """

@@ -34,7 +34,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 # Flat shapes are computed in the longest numbers of the processor: near a shape's plane or edge its parts cancel.
 Reals: TypeAlias = NDArray[np.floating[Any]]
 _LONG_EPSILON = float(np.finfo(np.longdouble).eps)
-# Rounding errors in units of that; the largest found in verification was a quarter of this.
+# Rounding errors; the largest found in verification was a tenth of this.
 _ROUNDINGS = 16 * _LONG_EPSILON
 
 # Below this angular size (radius over distance, squared) of a polygon the difference form is the more precise one.

@@ -27,9 +27,12 @@ DISTRIBUTIONS = [GGX(0.5), GGX(0.2, 0.7), Beckmann(0.3), Beckmann(0.6, 0.25)]
 KINDS = pytest.mark.parametrize("kind", [GGX, Beckmann])
 
 
+def direction_of(theta, phi):
+    return np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)
+
+
 def direction(degrees, azimuth=0.0):
-    theta, phi = np.radians(degrees), np.radians(azimuth)
-    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+    return np.array(direction_of(np.radians(degrees), np.radians(azimuth)))
 
 
 def facets(distribution, radial=240, around=240):
@@ -57,19 +60,19 @@ def test_facets_cover_the_surface_once(distribution):
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 @pytest.mark.parametrize("w", [direction(0), direction(40, 30), direction(75, 80)])
 def test_seen_facets_cover_what_is_seen_of_the_surface(distribution, w):
-    normals, solid_angles = facets(distribution, 400, 800)
+    normals, solid_angles = facets(distribution, 160, 320)
     facing = np.maximum(normals @ w, 0)
     total = np.sum(normal_density(distribution, normals).value * facing * solid_angles)
     # The sum of the facing facets' areas has a kink where they turn away.
-    assert masking(distribution, w).value * total == pytest.approx(w[2], rel=1e-4)
+    assert masking(distribution, w).value * total == pytest.approx(w[2], rel=1e-3)
 
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 def test_visible_normals_are_a_density(distribution):
-    normals, solid_angles = facets(distribution, 400, 800)
+    normals, solid_angles = facets(distribution, 160, 320)
     total = np.sum(visible_normal_density(distribution, direction(70, 20), normals).value * solid_angles)
     # As above.
-    assert total == pytest.approx(1, rel=1e-4)
+    assert total == pytest.approx(1, rel=1e-3)
 
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
@@ -186,6 +189,31 @@ def test_power_at_a_dielectric_is_the_sum_over_the_microfacets(kind, alpha, degr
     # Kinks at the horizon and at the critical angle.
     assert directional_reflectance(material, w[2]).value == pytest.approx(found[0], abs=3e-4)
     assert directional_transmittance(material, w[2]).value == pytest.approx(found[1], abs=3e-4)
+
+
+@KINDS
+@pytest.mark.parametrize(
+    ("make", "side", "level", "accuracy"),
+    [
+        (lambda d: RoughMirror(d, separable=True), 1, 0.8, 1e-10),
+        (lambda d: RoughConductor(d, 0.2, 3.9), 1, 0.8, 1e-10),
+        (lambda d: RoughDielectric(d, 1.5), 1, 0.8, 1e-10),
+        # Refraction ends at edges: of azimuth, and at the level from where only overhanging facets would send light.
+        (lambda d: RoughDielectric(d, 1.5), -1, np.arccos(direction(50)[2] / 1.5), 1e-5),
+        (lambda d: RoughDielectric(d, 1 / 1.5, separable=True), -1, np.arccos(direction(50)[2] * 1.5), 1e-5),
+    ],
+)
+def test_albedo_is_the_integral_of_the_bsdf(kind, make, side, level, accuracy):
+    w, material = direction(50), make(kind(0.4))
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    theta = np.concatenate([a + (b - a) * (nodes + 1) / 2 for a, b in ((0, level), (level, np.pi / 2))])
+    phi = (nodes + 1) * np.pi / 2
+    o = np.stack(np.broadcast_arrays(*direction_of(theta[:, None], phi)), axis=-1)
+    o[..., 2] *= side
+    rings = np.concatenate([level * weights, (np.pi / 2 - level) * weights]) / 2 * np.sin(theta) * np.cos(theta)
+    total = rings @ bsdf(material, w, o).value @ (weights * np.pi)
+    function = directional_reflectance if side == 1 else directional_transmittance
+    assert function(material, w[2]).value == pytest.approx(total, abs=accuracy)
 
 
 def test_roughest_ggx_mirror_seen_from_above():

@@ -208,6 +208,7 @@ BAD = [
     ({"quantity": "slab_reflectance", "cosine": 2, "eta": 1.5}, "/1/cosine: 2: input should be less than or equal"),
     ({"quantity": "closed_box", "emission": 1, "reflectance": 1}, "/1: "),
     ({"quantity": "closed_box", "emission": 1, "reflectance": 1.5}, "/1/reflectance: 1.5 is above 1"),
+    ({"quantity": "closed_box", "emission": 1, "reflectance": [0, 1.1]}, "/1/reflectance: [0, 1.1] is above 1"),
     ({"quantity": "closed_box", "emission": 1, "reflectance": 0.5, "bounces": 1.5}, "/1/bounces"),
     ({"quantity": "phong_albedo", "cosine": 1, "exponent": 2.5}, "/1/exponent: 2.5: input should be a valid integer"),
 ]  # fmt: skip

@@ -27,7 +27,7 @@ from oracle.irradiance.point_like import refuse_on_emitter
 _EPSILON = float(np.finfo(np.float64).eps)
 
 # Rounding errors; the largest found in verification was a quarter of this.
-_ROUNDINGS = 16 * _EPSILON
+_ROUNDINGS = 32 * _EPSILON
 
 # Receivers nearer to the line, in units of the distance to its further end, count as lying on it.
 _NEAREST = 1e-25

@@ -115,7 +115,7 @@ def _contour(cut: Segment) -> Bounded:
     start, end = p + q * np.cos(first), p + q * np.cos(last)
     ends = np.minimum(start, end)
     # Where the rim passes the receiver closely, the logarithm is not to be trusted.
-    trusted = (ends > 1e-2 * p) & (s > 1e-3 * p)
+    trusted = (ends > 1e-2 * p) & (s > 1e-12 * p)
     start = np.where(trusted, start, 1.0)
     step = np.cos(last) - np.cos(first)
     growth = np.where(trusted, q * step / start, 0.0)
@@ -129,7 +129,7 @@ def _contour(cut: Segment) -> Bounded:
     size = (
         np.abs(a) * 4 * np.pi
         + np.abs(b) * (2 * np.pi * k + x_first + x_last)
-        + (np.abs(d) + radius * np.sqrt(np.abs(ends))) * np.pi * s / np.maximum(ends, 1e-3 * p)
+        + (np.abs(d) + radius * np.sqrt(np.abs(ends))) * np.pi * s / np.where(trusted, ends, p)
     ) / s + np.pi
     return Bounded(value, np.where(trusted, 4 * _EPSILON * size, np.inf))
 
@@ -162,10 +162,12 @@ def _strips(cut: Segment, nodes: _Nodes) -> Bounded:
     # y(top) - y(bottom), precise even if they are close.
     span = np.log1p(cut.above / height * (bottom_exp + top_exp) / ((bottom_cosh + top_cosh) * bottom_exp))
 
-    # The integrand is nearly singular where the rim is nearest to the receiver; there the quadrature is cut in two.
+    # The quadrature is cut in two where the integrand is nearly singular: where the rim is nearest to the receiver, or
+    # under the receiver if the strips on both of its sides reach far.
     radius, tau = (cut.above + cut.below) / 2, bottom * height + (cut.above - cut.below) / 2
     far = np.hypot(tau, cut.aside)
     nearest = tau * (1 - radius / np.where(far == 0, 1.0, far)) / height
+    nearest = np.where((bottom < -10) & (top > 10), 0.0, nearest)
     share = (np.arcsinh(nearest) - np.arcsinh(bottom)) / span
     share = np.where((share > 1e-6) & (share < 1 - 1e-6) & (far > 0), share, 0.5)
 
@@ -188,8 +190,9 @@ def _strips(cut: Segment, nodes: _Nodes) -> Bounded:
     value = cut.sine * height / 2 * total
     # The number of right digits is proportional to that of the nodes; a half more is allowed for luck.
     scale = np.where(total == 0, 1.0, total)
-    doubt = np.maximum((by_twos / scale) ** 1.5, (by_threes / scale) ** 2)
-    return Bounded(value, value * (16 * _EPSILON + doubt))
+    by_twos, by_threes = by_twos / scale, by_threes / scale
+    doubt = np.maximum(by_twos**1.5, by_threes**2)
+    return Bounded(value, value * (16 * _EPSILON + np.where(by_twos < 1e-3, doubt, 10 * (by_twos + by_threes))))
 
 
 # Tried one after the other, until the bound is good.

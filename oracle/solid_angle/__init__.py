@@ -208,13 +208,15 @@ def _plane_angle(start: Floats, end: Floats, points: Floats) -> tuple[Floats, Fl
     a, a_low, scale = scaled_offsets(start, points, float(np.abs(end - start).max()))
     b, b_low = (part.T * scale for part in two_sum(end, -points))
     edge, edge_low = (part[:, None] * scale for part in two_sum(end, -start))
-    squares = []
+    normal = []
     for i, j in ((1, 2), (2, 0), (0, 1)):
         first, first_low = two_product(a[i], edge[j])
         second, second_low = two_product(a[j], edge[i])
         total, lost = two_sum(first, -second)
         lows = a_low[i] * edge[j] - a_low[j] * edge[i] + a[i] * edge_low[j] - a[j] * edge_low[i]
-        squares.append((total + (lost + (first_low - second_low + lows))) ** 2)
-    value = np.arctan2(np.sqrt(squares[0] + squares[1] + squares[2]), dot(a.T, a_low.T, b.T, b_low.T))
+        normal.append(total + (lost + (first_low - second_low + lows)))
+    # Not by squares, which underflow next to the ends.
+    sine = np.hypot(np.hypot(normal[0], normal[1]), normal[2])
+    value = np.arctan2(sine, dot(a.T, a_low.T, b.T, b_low.T))
     at_end = (a == 0).all(axis=0) | (b == 0).all(axis=0)
     return np.where(at_end, np.pi / 2, value), np.where(at_end, np.pi / 2, 8 * _EPSILON * value)

@@ -111,10 +111,13 @@ def split(polygons: Floats, distances: Floats) -> tuple[Floats, Floats, Floats]:
     t = distances / np.where(crosses, distances - onwards, 1.0)
     # Both sides share these vertices to the last bit.
     cuts = polygons + t * (np.roll(polygons, -1, axis=1) - polygons)
+    # Repeated vertices count once.
+    first = np.ones(distances.shape, dtype=np.bool_)
+    first[1:] = (polygons[:, 1:] != polygons[:, :-1]).any(axis=0)
     candidates = np.stack([polygons, cuts], axis=2).reshape(len(polygons), -1, polygons.shape[2])
     inside, outside, between = (
         _gather(candidates, np.stack([kept, crosses], axis=1).reshape(-1, kept.shape[1]))
-        for kept in (distances >= 0, distances <= 0, distances == 0)
+        for kept in ((distances >= 0) & first, (distances <= 0) & first, (distances == 0) & first)
     )
     return inside, outside, np.stack([between[:, :1], between[:, -1:]])
 

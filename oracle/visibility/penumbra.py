@@ -120,18 +120,28 @@ class _Scene:
         count, parts = points.shape[1], self.parts.shape[2]
         corner = self.light.vertices[0]
         size = float(np.abs(self.light.vertices - corner).max())
-        pieces = Pieces.of(self.parts, points, corner)
+        whole = pieces = Pieces.of(self.parts, points, corner)
         error = np.zeros(count)
         for blocker in self.blockers:
-            pieces, lost = _without(pieces, blocker, points, normals, corner, size)
-            error += lost
+            sight = Sight.of(blocker, points, corner, size)
+            # What is seen edge-on hides nothing, to rounding.
+            edge_on = whole.select(sight.thickness[whole.owner] > 0)
+            error += summed(edge_on.owner, edge_on.outline(normals) * sight.thickness[edge_on.owner], count)
+            # Most occluders concern few receivers.
+            concerned = np.zeros(count, dtype=np.bool_)
+            concerned[whole.owner[sight.meets(whole)]] = True
+            if concerned.any():
+                concerns = concerned[pieces.owner]
+                rest, lost = _without(pieces.select(concerns), sight, normals)
+                pieces = joined([pieces.select(~concerns), rest])
+                error += lost
         # Who sees all sees the emitter without occluders, whose form keeps more digits.
         everything = np.bincount(pieces.owner[pieces.cuts == 0], minlength=count) == parts
         value = np.zeros(count)
         if everything.any():
-            whole = polygon(self.light, points[:, everything].T, normals[:, everything].T, two_sided=True)
-            value[everything] = whole.value
-            error[everything] += whole.error
+            unhidden = polygon(self.light, points[:, everything].T, normals[:, everything].T, two_sided=True)
+            value[everything] = unhidden.value
+            error[everything] += unhidden.error
         pieces = pieces.select(~everything[pieces.owner])
         if len(pieces.owner):
             partly = pieces.irradiance(normals, size)
@@ -140,28 +150,13 @@ class _Scene:
         return Bounded(value, error)
 
 
-def _without(
-    pieces: Pieces, blocker: Blocker, points: Floats, normals: Floats, corner: Floats, size: float
-) -> tuple[Pieces, Floats]:
+def _without(pieces: Pieces, sight: Sight, normals: Floats) -> tuple[Pieces, Floats]:
     """Subtract a convex occluder from all pieces; also how much rounding may have moved its outline (N,) [sr]."""
-    count = points.shape[1]
+    count = normals.shape[1]
     lost = np.zeros(count)
-    sight = Sight.of(blocker, points, corner, size)
-    hides = sight.side[pieces.owner] != 0
-    kept = [pieces.select(~hides)]
-    lost += summed(kept[0].owner, kept[0].outline(normals) * sight.thickness[kept[0].owner], count)
-    rest = pieces.select(hides)
-
-    # Most pieces are wholly beside the occluder: outside the plane of one of its edges, or it outside one of theirs.
-    for i in range(sight.planes.shape[1]):
-        distances, noise = sight.distances(i, rest)
-        beside = (distances + noise).max(axis=0) < 0
-        kept.append(rest.select(beside))
-        rest = rest.select(~beside)
-    beside = sight.beside(rest)
-    kept.append(rest.select(beside))
-    rest = rest.select(~beside)
-
+    meets = sight.meets(pieces)
+    kept = [pieces.select(~meets)]
+    rest = pieces.select(meets)
     for i in range(sight.planes.shape[1]):
         distances, noise = sight.distances(i, rest)
         # Where rounding may have moved the plane, the outline's length tells how much light that is.

@@ -51,7 +51,7 @@ class Pieces:
         both = np.concatenate([vertices - corner[:, None, None], vertices - points[:, None, owner]])
         return cls(both, owner, np.zeros(len(owner)))
 
-    def select(self, which: Booleans) -> Pieces:
+    def select(self, which: Booleans | Integers) -> Pieces:
         """Some of the pieces."""
         return Pieces(self.both[:, :, which], self.owner[which], self.cuts[which])
 

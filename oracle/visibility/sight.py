@@ -108,8 +108,22 @@ class Sight:
         result: Floats = 2 * noise.max(axis=0) / np.maximum(long, SMALLEST)
         return result
 
-    def beside(self, pieces: Pieces) -> Booleans:
-        """Whether the whole occluder is outside the plane of one of a piece's edges, beyond rounding errors."""
+    def meets(self, pieces: Pieces) -> Booleans:
+        """Which pieces are not wholly beside the occluder, to rounding; shape (P,).
+
+        Outside the plane of one of the occluder's edges, or with the occluder outside the plane of one of theirs.
+        """
+        result: Booleans = self.side[pieces.owner] != 0
+        for i in range(self.planes.shape[1]):
+            near = np.flatnonzero(result)
+            distances, noise = self.distances(i, pieces.select(near))
+            result[near] = (distances + noise).max(axis=0) >= 0
+        near = np.flatnonzero(result)
+        result[near] = ~self._is_outside(pieces.select(near))
+        return result
+
+    def _is_outside(self, pieces: Pieces) -> Booleans:
+        """Whether the whole occluder is outside the plane of one of a piece's edges."""
         result = np.zeros(len(pieces.owner), dtype=np.bool_)
         offsets = pieces.offsets
         edges = np.roll(pieces.relative, -1, axis=1) - pieces.relative

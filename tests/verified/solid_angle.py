@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from flint import acb, arb
+from flint import acb, arb, ctx
 from hypothesis import strategies as st
 from verification import Form
 from verified.disk import axes, near_the_rim, placed
@@ -50,13 +50,13 @@ def excess_of_polygon(configuration):
 
 
 def excess_of_rectangle(configuration):
-    center, u, v, point = ([ball(x) for x in part] for part in configuration)
+    center, u, v = (balls(part) for part in configuration[:3])
     corners = [plus(center, plus(times(u, s), times(v, t))) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     return excess(corners, configuration[3])
 
 
 def contour(configuration):
-    """Solid angle of a disk: along its rim, w . (x dx) / (|x| (|x| + w . x)) has the area on the sphere as its integral.
+    """Solid angle of a disk: w . (x x dx) / (|x| (|x| + w . x)), integrated along the rim, is the area on the sphere.
 
     It is the vector potential of a monopole, singular only opposite to w, the direction from the point to the plane.
     """
@@ -101,9 +101,11 @@ def cap(configuration):
 
 def angle_of_segment(configuration):
     start, end, point = configuration
-    a, b = minus(balls(start), balls(point)), minus(balls(end), balls(point))
-    cosine = dot(a, b) / (norm(a) * norm(b))
-    return number(cosine.acos()) if abs(cosine) < 1 else None
+    # The arc cosine of small angles loses half of the digits.
+    with ctx.workprec(320):
+        a, b = minus(balls(start), balls(point)), minus(balls(end), balls(point))
+        cosine = dot(a, b) / (norm(a) * norm(b))
+        return number(cosine.acos()) if abs(cosine) < 1 else None
 
 
 def of(shape):
