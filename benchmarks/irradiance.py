@@ -23,7 +23,7 @@ import time
 import numpy as np
 
 from oracle.emitters import Area, Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.shapes import Rectangle
 
 TARGET_RATE = 2e6

@@ -20,7 +20,7 @@ import time
 import numpy as np
 
 from oracle.emitters import Receivers
-from oracle.irradiance import projected_solid_angle
+from oracle.irradiances import projected_solid_angle
 from oracle.shapes import Polygon, Rectangle
 from oracle.visibility import visible_projected_solid_angle
 

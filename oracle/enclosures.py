@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from oracle.arrays import Floats, InvalidArgument, length, light
 from oracle.bounded import Bounded
 from oracle.emitters import Area, Point, Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.reflection.domain import together, within
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Sphere
 

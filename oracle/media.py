@@ -14,7 +14,7 @@ from oracle.arrays import Floats, InvalidArgument, direction, dot, finite, light
 from oracle.bounded import Bounded
 from oracle.chunks import chunks
 from oracle.emitters import Directional, Point, Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.reflection.domain import together, within
 
 _EPSILON = float(np.finfo(np.float64).eps)

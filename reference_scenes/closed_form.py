@@ -1,6 +1,6 @@
 """The expectation of a scene in closed form: direct light on convex diffuse surfaces, integrated over pixels.
 
-The closed forms of `oracle.irradiance` hold while nothing but the receiver's own horizon hides an area emitter and
+The closed forms of `oracle.irradiances` hold while nothing but the receiver's own horizon hides an area emitter and
 no surface lights another. `require_closed_form` proves both for a scene or names what stands in the way.
 """
 
@@ -15,7 +15,7 @@ from oracle import shapes as oracle_shapes
 from oracle.arrays import Booleans, Floats, Integers, direction
 from oracle.emitters import Receivers
 from oracle.expectation import Expectation, Provenance
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from reference_scenes import model
 
 # A ray that starts on a surface must not meet it again; relative to the size of the coordinates involved.
@@ -110,7 +110,9 @@ def _oracle_emitter(emitter: model.Emitter) -> emitters.Emitter:
                 case model.Sphere() as shape:
                     return emitters.Area(oracle_shapes.Sphere(np.array(shape.center), shape.radius), radiance)
                 case model.Mesh() as shape:
-                    return emitters.Area(oracle_shapes.Mesh(np.array(shape.vertices), np.array(shape.triangles)), radiance)
+                    return emitters.Area(
+                        oracle_shapes.Mesh(np.array(shape.vertices), np.array(shape.triangles)), radiance
+                    )
 
 
 def _unit(vector: model.Vector) -> Floats:

@@ -11,7 +11,7 @@ from scipy import stats
 
 from oracle import pixels
 from oracle.emitters import Area, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.shapes import Disk, Polygon, Sphere
 from reference_scenes import model
 from reference_scenes.closed_form import NoClosedForm, camera_rays, closed_form, film_radiance, require_closed_form

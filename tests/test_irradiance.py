@@ -13,7 +13,7 @@ from quadrature import orthonormal, unit
 
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Area, Constant, Directional, Point, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.shapes import Disk, Polygon, Sphere
 
 quick = settings(derandomize=True, deadline=None, max_examples=60)

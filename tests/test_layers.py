@@ -111,4 +111,4 @@ def test_the_door_is_light(statement):
 
 def test_what_is_loaded_is_seen():
     # So that the test above is known to see modules.
-    assert {"numpy", "oracle.irradiance"} <= loaded_by("import oracle.irradiance")
+    assert {"numpy", "oracle.irradiances"} <= loaded_by("import oracle.irradiances")

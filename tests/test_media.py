@@ -8,7 +8,7 @@ import pytest
 from oracle import half_space, media
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Directional, Point, Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 
 GROUND = media.HalfSpace([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
 FOG = media.Medium([0.1, 0.2], [0.3, 0.5], 0.4)

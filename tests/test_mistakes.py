@@ -9,7 +9,7 @@ from scipy.integrate import dblquad, quad
 
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Area, Constant, CosineSky, Directional, Equirectangular, Line, Point, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.mistakes import MISTAKES, applies, mistaken_irradiance
 from oracle.mistakes.quadrature import Kernel, over_line, over_shape
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Sphere

@@ -8,7 +8,7 @@ import pytest
 from oracle.arrays import InvalidArgument
 from oracle.bounded import Bounded
 from oracle.emitters import Area, Directional, Receivers
-from oracle.irradiance import projected_solid_angle
+from oracle.irradiances import projected_solid_angle
 from oracle.reflection import lambert, phong
 from oracle.shapes import Disk, Polygon, Rectangle, Sphere
 

@@ -8,7 +8,7 @@ import pytest
 
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Constant, CosineSky, Directional, Equirectangular, Line, Point, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 
 ORIGIN = np.zeros(3)
 UP = np.array([0.0, 0.0, 1.0])

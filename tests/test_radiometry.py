@@ -6,7 +6,7 @@ import pytest
 from oracle import radiometry as r
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Area, Constant, CosineSky, Directional, Line, Point, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.radiometry import Measure, Unit, collected_flux, emitting, exitance, flux, intensity, radiosity
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Sphere
 

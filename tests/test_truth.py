@@ -18,7 +18,7 @@ from graders.cli import _run
 from graders.cli.reading import Unreadable, read_values
 from graders.errors import UsageError
 from oracle import emitters, shapes
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.truth import KINDS, Answer, AnyCase, evaluate
 
 ORACLE = Path(sys.executable).with_name("oracle")

@@ -7,9 +7,9 @@ import pytest
 
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Area, Constant, CosineSky, Directional, Equirectangular, Line, Point, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Sphere
-from oracle.vector_irradiance import vector_irradiance
+from oracle.vector_irradiances import vector_irradiance
 
 UP = np.array([0.0, 0.0, 1.0])
 # Corners of the unit cube, and its sides' triangles with their fronts inside.

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Receivers
-from oracle.irradiance import projected_solid_angle
+from oracle.irradiances import projected_solid_angle
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Sphere
 from oracle.view_factors import crossed_strings, view_factor, view_factors
 from oracle.view_factors.polygons import exchange_area

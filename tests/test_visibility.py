@@ -5,7 +5,7 @@ import pytest
 
 from oracle.arrays import InvalidArgument
 from oracle.emitters import Directional, Point, Receivers, Spot
-from oracle.irradiance import projected_solid_angle
+from oracle.irradiances import projected_solid_angle
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Sphere
 from oracle.visibility import conic_shadow, polygon_shadow, visible, visible_projected_solid_angle
 from oracle.visibility.convex import convex_parts

@@ -2,8 +2,8 @@
 
 ``make verify`` draws 20,000 configurations of every form and prints how far each is from the truth, and whether the
 bounds that the forms return with their values hold. The test suite does the same with fewer. References live beside
-their forms' strategies in ``tests/verified``; they share no code with `oracle`. Most integrate with Arb's ball arithmetic
-(python-flint), which proves how many of its digits are right.
+their forms' strategies in ``tests/verified``; they share no code with `oracle`. Most integrate with Arb's ball
+arithmetic (python-flint), which proves how many of its digits are right.
 """
 
 import importlib
@@ -28,8 +28,8 @@ TYPICAL = 1e-12
 class Form:
     """A closed form and its reference.
 
-    `computed` takes a configuration to a pair of floats: value and bound on its absolute error. `exact` takes it to the
-    true value, right to 1e-14 at least relative to the value, or None if the reference does not cover it. `share` is the
+    `computed` takes a configuration to a pair of floats: value and bound on its absolute error. `exact` takes it to
+    the true value, right to 1e-14 at least relative to the value, or None if the reference does not cover it. `share` is the
     part of the configurations on which the form may confess, by its bound, a relative error above `WORST`.
     """
 
@@ -130,9 +130,10 @@ def main(count: int, pattern: str = "") -> None:
             continue
         findings = examine(form, count)
         errors = np.array(findings.errors)
+        quantiles = f"{np.median(errors):.1g} | {np.quantile(errors, 0.999):.1g} | {findings.worst_promised:.1g}"
         print(
-            f"| {form.name} | {len(errors) + findings.dark:,} | {findings.dark:,} | {np.median(errors):.1g} | {np.quantile(errors, 0.999):.1g} | "
-            f"{findings.worst_promised:.1g} | {findings.confessed:.2%} | {np.median(findings.bounds):.1g} |",
+            f"| {form.name} | {len(errors) + findings.dark:,} | {findings.dark:,} | {quantiles} | "
+            f"{findings.confessed:.2%} | {np.median(findings.bounds):.1g} |",
             flush=True,
         )
         try:

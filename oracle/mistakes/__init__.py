@@ -48,7 +48,7 @@ def mistaken_irradiance(
     -------
     Bounded
         Irradiance [W/m^2], or what the mistake makes of this unit, shape (..., C). The bound is that of
-        `oracle.irradiance` where the mistake leaves the integral alone; for other integrands it is an estimate of
+        `oracle.irradiances` where the mistake leaves the integral alone; for other integrands it is an estimate of
         adaptive quadrature, near 1e-8 of the value, and 1e-6 for receivers very near the light.
 
     Raises

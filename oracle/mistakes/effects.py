@@ -11,7 +11,7 @@ import numpy as np
 from oracle.arrays import Floats, InvalidArgument, dot
 from oracle.bounded import Bounded
 from oracle.emitters import Area, Constant, Directional, Emitter, Line, Point, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.mistakes.quadrature import Kernel, over_line, over_shape, refuse_on_light
 from oracle.radiometry.emission import angle_between
 

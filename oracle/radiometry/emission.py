@@ -146,7 +146,7 @@ def collected_flux(emitter: Directional | Constant, shape: Shape) -> Bounded:
     Raises
     ------
     InvalidArgument
-        If the emitter is of another kind, for which `oracle.irradiance` has to be integrated, or the shape is none.
+        If the emitter is of another kind, for which `oracle.irradiances` has to be integrated, or the shape is none.
     """
     if not isinstance(shape, Shape):
         raise InvalidArgument(f"shape is a {type(shape).__name__}, not one of oracle.shapes")

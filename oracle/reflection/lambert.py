@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from oracle.arrays import Floats, light
 from oracle.bounded import Bounded
 from oracle.emitters import Emitter, Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.reflection.domain import together, within
 from oracle.shapes import Sphere
 
@@ -25,7 +25,7 @@ def exitance(received: Bounded, reflectance: ArrayLike) -> Bounded:
     Parameters
     ----------
     received : Bounded
-        Irradiance [W/m^2], shape (..., C), as `oracle.irradiance.irradiance` returns it.
+        Irradiance [W/m^2], shape (..., C), as `oracle.irradiances.irradiance` returns it.
     reflectance : array_like
         Part that is reflected, in [0, 1], shape (C,) or (..., C).
 
@@ -48,7 +48,7 @@ def radiance(received: Bounded, reflectance: ArrayLike) -> Bounded:
     Parameters
     ----------
     received : Bounded
-        Irradiance [W/m^2], shape (..., C), as `oracle.irradiance.irradiance` returns it.
+        Irradiance [W/m^2], shape (..., C), as `oracle.irradiances.irradiance` returns it.
     reflectance : array_like
         Part that is reflected, in [0, 1], shape (C,) or (..., C).
 

@@ -14,7 +14,7 @@ from oracle import emitters as sources
 from oracle.arrays import Floats
 from oracle.bounded import Bounded
 from oracle.emitters import Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from oracle.truth.case import Case, InvalidField, Law, building
 from oracle.truth.fields import Vector
 from oracle.truth.laws import irradiance_of
@@ -112,7 +112,7 @@ class VectorIrradiance(_Lit):
     @classmethod
     def computed(cls, together: Sequence[Self]) -> Bounded:
         """Vectors of shape (N, 3), or (N, 3, C) if an emitter has channels."""
-        from oracle.vector_irradiance import vector_irradiance
+        from oracle.vector_irradiances import vector_irradiance
 
         points = np.array([case.point for case in together])
         return together[0].in_form(vector_irradiance(together[0].built(), points))

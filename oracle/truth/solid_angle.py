@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from oracle.bounded import Bounded
-from oracle.irradiance import projected_solid_angle
+from oracle.irradiances import projected_solid_angle
 from oracle.truth.case import Case, Law, building
 from oracle.truth.fields import Angle, Model, TwoSided, Vector
 from oracle.truth.laws import projected_solid_angle_of
@@ -57,7 +57,7 @@ class SolidAngle(Case):
     @classmethod
     def computed(cls, together: Sequence[Self]) -> Bounded:
         """Solid angles (N,)."""
-        from oracle.solid_angle import cone, solid_angle
+        from oracle.solid_angles import cone, solid_angle
 
         shape = together[0].shape
         if isinstance(shape, Cone):

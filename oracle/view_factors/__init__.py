@@ -9,7 +9,7 @@ import numpy as np
 from oracle.arrays import Floats, InvalidArgument, dot
 from oracle.bounded import Bounded
 from oracle.emitters import Receivers
-from oracle.irradiance import projected_solid_angle
+from oracle.irradiances import projected_solid_angle
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
 from oracle.view_factors.aligned import Rectangles, exchange_areas
 from oracle.view_factors.disks import coaxial_disks, sphere_to_coaxial_disk, sphere_to_polygon

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oracle.arrays import Floats, dot
-from oracle.irradiance.polygon import polygon
+from oracle.kernels.polygon import polygon
 from oracle.shapes import Polygon
 from oracle.view_factors.quadrature import APART, POINTS, gauss, graded
 

@@ -19,7 +19,7 @@ from oracle.arrays import Floats
 from oracle.bounded import Bounded
 from oracle.chunks import chunks
 from oracle.emitters import Receivers
-from oracle.irradiance.polygon import polygon
+from oracle.kernels.polygon import polygon
 from oracle.shapes import Polygon, Shape
 from oracle.visibility.convex import convex_parts, join, polygons_of, split
 from oracle.visibility.pieces import Pieces, joined, light_by_distance, summed

@@ -12,7 +12,7 @@ import numpy as np
 
 from oracle.arrays import Booleans, Floats, Integers
 from oracle.bounded import Bounded
-from oracle.irradiance.polygon import contour
+from oracle.kernels.polygon import contour
 from oracle.visibility.convex import join
 
 EPSILON = float(np.finfo(np.float64).eps)

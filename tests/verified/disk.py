@@ -30,7 +30,7 @@ from verified.geometry import (
 )
 
 from oracle import emitters, shapes
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 
 
 def covered(center, u, v, radius, normal):

@@ -14,7 +14,7 @@ from verification import Form
 from verified.geometry import balls, between, cross, directions, dot, frame, integral, norm, number, powers_of_ten, unit
 
 from oracle.emitters import Constant, CosineSky, Equirectangular, Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 
 
 def of(emitter, normal):

@@ -26,7 +26,7 @@ from verified.geometry import (
 )
 
 from oracle.emitters import Line, Receivers
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 
 
 def exact(configuration):

@@ -21,7 +21,7 @@ from verified.geometry import (
 )
 
 from oracle.emitters import Directional, Point, Receivers, Spot
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 
 
 def of(emitter, point, normal):

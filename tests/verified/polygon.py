@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from verification import Form
 
 from oracle import emitters, shapes
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 from verified.geometry import (
     ball,
     balls,

@@ -26,7 +26,7 @@ from verified.geometry import (
 )
 
 from oracle.shapes import Disk, Polygon, Rectangle, Sphere
-from oracle.solid_angle import cone, plane_angle, solid_angle
+from oracle.solid_angles import cone, plane_angle, solid_angle
 
 
 def excess(corners, point):

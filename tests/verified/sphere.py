@@ -10,7 +10,7 @@ from verified.disk import axes, covered
 from verified.geometry import ball, balls, between, directions, dot, frame, minus, number, powers_of_ten, times, unit
 
 from oracle import emitters, shapes
-from oracle.irradiance import irradiance
+from oracle.irradiances import irradiance
 
 
 def exact(configuration):

@@ -32,7 +32,7 @@ from verified.geometry import (
 
 from oracle.emitters import Area, CosineSky, Equirectangular, Line, Spot
 from oracle.shapes import Disk, Polygon, Sphere
-from oracle.vector_irradiance import vector_irradiance
+from oracle.vector_irradiances import vector_irradiance
 
 
 def of(emitter, point, axis):

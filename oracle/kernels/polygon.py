@@ -1,8 +1,8 @@
 """Projected solid angle of polygons, clipped at the receiver's horizon.
 
 Stokes' theorem turns the integral of the receiver's cosine over the polygon's solid angle into one along its edges,
-``1/2 sum_i Theta_i (n . Gamma_i)``, with the angle Theta_i that edge i subtends and the unit normal Gamma_i of the plane
-through edge and receiver [Lambert 1760; Nishita and Nakamae 1985; Arvo 1994]. Two things keep its digits:
+``1/2 sum_i Theta_i (n . Gamma_i)``, with the angle Theta_i that edge i subtends and the unit normal Gamma_i of the
+plane through edge and receiver [Lambert 1760; Nishita and Nakamae 1985; Arvo 1994]. Two things keep its digits:
 
 - The angle comes from atan2 of sine and cosine; the arc cosine loses half of its digits for small angles.
 - The contributions of a far polygon's edges cancel but for the square of its angular size. The constant part of
@@ -196,7 +196,7 @@ def _near_contour(offsets: Reals, relative: Reals, heights: Reals | None, n: Rea
 def _edge_above(
     start: Reals, end: Reals, edge: Reals, z0: Reals, z1: Reals
 ) -> tuple[Reals, Reals, Reals, Reals, Reals]:
-    """The part of edges above the horizon: start, end, fraction of the edge, crossing, and +1 or -1 for upwards or not."""
+    """The part of edges above the horizon: start, end, fraction, crossing, and +1 or -1 if it leads up or down."""
     upwards, downwards = (z0 < 0) & (z1 >= 0), (z0 >= 0) & (z1 < 0)
     crosses = upwards | downwards
     t = z0 / np.where(crosses, z0 - z1, 1.0)

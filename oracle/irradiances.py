@@ -23,13 +23,14 @@ from oracle.emitters import (
     Receivers,
     Spot,
 )
-from oracle.irradiance import disk, environment, line, point_like, polygon, sphere
+from oracle.kernels import disk, environment, line, point_like, polygon, sphere
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
+from oracle.visibility import visible, visible_projected_solid_angle
 
 __all__ = ["irradiance", "projected_solid_angle"]
 
 
-def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers) -> Bounded:
+def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers, occluders: Sequence[Shape] = ()) -> Bounded:
     """Irradiance of one emitter, or of several together, clipped at each receiver's horizon.
 
     Parameters
@@ -38,6 +39,9 @@ def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers) -> Bo
         All with the same number of channels C.
     receivers : Receivers
         Points [m] and unit normals, shape (..., 3).
+    occluders : sequence of Shape
+        Opaque surfaces. Of points, spots and parallel light any shape hides; of flat area emitters only flat shapes
+        may; other emitters take no occluders. What two of them hide counts once.
 
     Returns
     -------
@@ -47,13 +51,15 @@ def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers) -> Bo
     Raises
     ------
     InvalidArgument
-        If there is no emitter, one is of another type, or their numbers of channels differ.
+        If there is no emitter, one is of another type, their numbers of channels differ, or no closed form is known
+        for an emitter past these occluders.
 
     Notes
     -----
-    Light adds up [Lambert 1760]. The module of each kind of emitter states formula and source.
+    Light adds up [Lambert 1760]. The modules of `oracle.kernels` state formula and source for each kind of emitter,
+    `oracle.visibility` for what is hidden.
     """
-    together = list(emitter) if isinstance(emitter, list | tuple) else [emitter]
+    together: list[Emitter] = list(emitter) if isinstance(emitter, Sequence) else [emitter]
     if not together:
         raise InvalidArgument("emitter is an empty sequence")
     for index, one in enumerate(together):
@@ -63,6 +69,9 @@ def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers) -> Bo
     for index, count in enumerate(channels):
         if count != channels[0]:
             raise InvalidArgument(f"emitter[{index}] has {count} channels, emitter[0] has {channels[0]}")
+    if len(occluders):
+        return reduce(add, (_past(one, receivers, occluders) for one in together))
+
     shape = (*receivers.shape, channels[0])
     result = Bounded(np.empty(shape), np.empty(shape))
     parts = [simple for one in together for simple in _parts(one)]
@@ -91,6 +100,24 @@ def projected_solid_angle(shape: Shape, receivers: Receivers, two_sided: bool = 
     """
     result = irradiance(Area(shape, np.ones(1), two_sided), receivers)
     return Bounded(result.value[..., 0], result.error[..., 0])
+
+
+def _past(emitter: Emitter, receivers: Receivers, occluders: Sequence[Shape]) -> Bounded:
+    """Irradiance of one emitter past occluders."""
+    match emitter:
+        case Point() | Spot() | Directional():
+            seen = visible(emitter, receivers.points, occluders)[..., None]
+            open_sky = irradiance(emitter, receivers)
+            return Bounded(np.where(seen, open_sky.value, 0.0), np.where(seen, open_sky.error, 0.0))
+        case Area(Polygon() | Rectangle() | Mesh() as shape):
+            factor = visible_projected_solid_angle(shape, receivers, occluders, emitter.two_sided)
+            return Bounded(factor.value[..., None], factor.error[..., None]) * emitter.radiance
+        case _:
+            kind = type(emitter.shape if isinstance(emitter, Area) else emitter).__name__
+            raise InvalidArgument(
+                f"occluders: no closed form for a {kind} past occluders; a point, spot, parallel light, polygon, "
+                "rectangle or mesh has one"
+            )
 
 
 def _channels(emitter: Emitter) -> int:

@@ -22,7 +22,7 @@ from oracle.arrays import Floats
 from oracle.bounded import Bounded
 from oracle.compensated import dot, two_product, two_sum
 from oracle.emitters import Line
-from oracle.irradiance.point_like import refuse_on_emitter
+from oracle.kernels.point_like import refuse_on_emitter
 
 _EPSILON = float(np.finfo(np.float64).eps)
 

@@ -7,7 +7,7 @@ import numpy as np
 from oracle.arrays import Floats
 from oracle.bounded import Bounded
 from oracle.compensated import cross, dot, dot_in_parts, scaled_offsets
-from oracle.irradiance.segment import Segment, segment
+from oracle.kernels.segment import Segment, segment
 from oracle.shapes import Sphere
 
 _EPSILON = float(np.finfo(np.float64).eps)

@@ -24,7 +24,7 @@ from oracle.emitters import (
     Point,
     Spot,
 )
-from oracle.irradiance import environment, line, point_like
+from oracle.kernels import environment, line, point_like
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
 
 __all__ = ["vector_irradiance"]

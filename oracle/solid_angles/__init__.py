@@ -11,8 +11,8 @@ from oracle.bounded import Bounded
 from oracle.chunks import chunks
 from oracle.compensated import dot, scaled_offsets, two_product, two_sum
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
-from oracle.solid_angle.disk import disk
-from oracle.solid_angle.polygon import polygon, rectangle
+from oracle.solid_angles.disk import disk
+from oracle.solid_angles.polygon import polygon, rectangle
 
 __all__ = ["area_to_solid_angle", "cone", "plane_angle", "solid_angle", "solid_angle_to_area"]
 

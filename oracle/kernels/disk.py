@@ -7,7 +7,7 @@ import numpy as np
 from oracle.arrays import Booleans, Floats
 from oracle.bounded import Bounded
 from oracle.compensated import cross, dot, scaled_offsets
-from oracle.irradiance.segment import Segment, segment
+from oracle.kernels.segment import Segment, segment
 from oracle.shapes import Disk
 
 _EPSILON = float(np.finfo(np.float64).eps)
