@@ -152,7 +152,7 @@ def _touching(cells: _Cells, chosen: Booleans) -> Booleans:
 
 
 def _raise_order(image: Image, cells: _Cells, allowed: Floats) -> _Estimate:
-    """Mean over smooth cells by quadrature of rising order until two orders agree; tells where an edge came to light."""
+    """Mean over smooth cells by quadrature of rising order until two orders agree; tells where an edge was found."""
     count = len(cells.pixel)
     result = _Estimate(np.zeros_like(allowed), np.full_like(allowed, np.inf), np.zeros(count, dtype=np.bool_))
     pending = np.arange(count)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import doctest
 import json
 import re
 from pathlib import Path
@@ -49,6 +50,12 @@ def test_the_readme_s_submission_is_valid():
 
     example = re.search(r"```toml\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     validate(tomllib.loads(example[1]), CommandSubmission, "README.md")
+
+
+def test_what_is_typed_into_python_gives_what_the_page_says():
+    finished = doctest.testfile(str(ROOT / "docs" / "light.md"), module_relative=False)
+    assert finished.attempted >= 3
+    assert not finished.failed
 
 
 def test_every_command_is_documented():

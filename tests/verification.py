@@ -29,8 +29,8 @@ class Form:
     """A closed form and its reference.
 
     `computed` takes a configuration to a pair of floats: value and bound on its absolute error. `exact` takes it to
-    the true value, right to 1e-14 at least relative to the value, or None if the reference does not cover it. `share` is the
-    part of the configurations on which the form may confess, by its bound, a relative error above `WORST`.
+    the true value, right to 1e-14 at least relative to the value, or None if the reference does not cover it. `share`
+    is the part of the configurations on which the form may confess, by its bound, a relative error above `WORST`.
     """
 
     name: str

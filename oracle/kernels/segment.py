@@ -10,7 +10,7 @@ work:
 - The strips: all that counts is positive in ``g H int t int ds / (s^2 + tau^2 + H^2)^2 dt``. The strip parallel to the
   chord is elementary. Quadrature across the strips, double-exponential [Takahasi and Mori 1974] in asinh(tau / H),
   keeps nearly all digits, however thin, far or near the segment is, for twenty times the price. Gauss's suffices, for
-  five times, where the disk is three radii away or further.
+  ten times, where the disk is three radii away or further.
 """
 
 from __future__ import annotations
@@ -199,7 +199,7 @@ def _strips(cut: Segment, nodes: _Nodes) -> Bounded:
 _STRIPS = [partial(_strips, nodes=_Nodes.tanh_sinh(count)) for count in (24, 48, 96)]
 
 # Gauss's nodes and weights in (0, 1) for segments that are small as seen from the receiver.
-_X, _W = (part[:, None] / 2 for part in np.polynomial.legendre.leggauss(16))
+_X, _W = (part[:, None] / 2 for part in np.polynomial.legendre.leggauss(28))
 _X = _X + 0.5
 
 
@@ -213,7 +213,7 @@ def _small(cut: Segment) -> Bounded:
     line = np.sqrt(line2)
     terms = _W * half * chord * t / (line2 * line) * _strip(chord, cut.aside, line)
     value: Floats = cut.sine * cut.distance / 2 * terms.sum(axis=0)
-    return Bounded(value, 48 * _EPSILON * value)
+    return Bounded(value, 64 * _EPSILON * value)
 
 
 def _strip(half: Floats, aside: Floats, line: Floats) -> Floats:

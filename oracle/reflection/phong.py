@@ -53,6 +53,8 @@ def axial_moment(shape: Polygon | Rectangle, receivers: Receivers, axes: ArrayLi
     ``z = c cos(s)``, on which ``dphi = b ds / (1 - z^2)``. Arvo's recurrence is the expansion of that quotient; here it
     is integrated by a Gauss rule over the part of the arc where the power matters, and in closed form beyond, which
     costs the same for all exponents. Small polygons are integrated over their area.
+    Of polygons that are long and thin but not small, the long edges nearly cancel: relative digits go with the width
+    over the length (needles 1e-4 thin: some 1e-12), as the bound says.
     """
     return _moment(shape, receivers, axes, exponent, double=False)
 

@@ -39,10 +39,9 @@ class ConicShadow:
         """
         tolerance = length("tolerance", tolerance)
         corners, up = self._receiver.vertices, self._receiver.normal
-        # The outline meets the receiver's, or comes from infinity, at these angles only.
+        # The outline meets the receiver's at these angles only. A branch that comes from infinity begins outside.
         borders = [(corner, np.cross(up, edge)) for corner, edge in self._borders()]
         cuts = [self._rim.cut(corner, edge) for corner, edge in self._borders()]
-        cuts.append(self._rim.level(up))
         angles = np.sort(np.concatenate(cuts) % (2 * np.pi))
         ends = np.append(angles, angles[0] + 2 * np.pi) if len(angles) else np.array([0.0, 2 * np.pi])
         arcs = []
@@ -190,14 +189,8 @@ class _Rim:
         """Angles, at most two, at which the rays pass through the line through `corner` along `edge`."""
         to_light = self.light if self.parallel else self.light - corner
         normal = np.cross(edge, to_light)
-        return self._zeros(normal @ (self.center - corner), normal)
-
-    def level(self, up: Floats) -> Floats:
-        """Angles at which the circle is as high as the light."""
-        return np.empty(0) if self.parallel else self._zeros(up @ (self.center - self.light), up)
-
-    def _zeros(self, constant: Floats, normal: Floats) -> Floats:
-        """Zeros of constant + cos(f) normal . u + sin(f) normal . v."""
+        # What is left is a zero of constant + cosine cos(f) + sine sin(f).
+        constant = normal @ (self.center - corner)
         cosine, sine = normal @ self.u, normal @ self.v
         amplitude = np.hypot(cosine, sine)
         if abs(constant) >= amplitude:

@@ -128,8 +128,6 @@ def _separating(hiding: Floats, corners: Floats, weight: float, scale: float) ->
     """Planes, by a point and a normal towards the occluder, that have occluder and emitter on different sides."""
     spanned = [(start, edge, corner - weight * start) for start, edge in _edges(hiding) for corner in corners]
     spanned += [(start, edge, corner - start) for start, edge in _edges(corners) for corner in hiding]
-    # The occluder's own plane.
-    spanned.append((hiding[0], hiding[1] - hiding[0], hiding[2] - hiding[0]))
     for at, first, second in spanned:
         normal = np.cross(first, second)
         noise = _TOUCH * scale * np.linalg.norm(first) * np.linalg.norm(second)
@@ -157,7 +155,6 @@ def _umbra(where: Floats, hiding: Floats, corners: Floats, weight: float, scale:
             if weight == 0 or min(sides) < -noise * np.linalg.norm(edge):
                 return where[:0]
             continue
-        where = _clip(where, -np.sign(height) * ((where - start) @ face))
         for at, along in _edges(hiding):
             normal = np.cross(along, corner - weight * at)
             inwards = np.sign((middle - at) @ normal)

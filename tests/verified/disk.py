@@ -38,29 +38,33 @@ def covered(center, u, v, radius, normal):
 
     All in balls and relative to the receiver.
     """
+    cu, cv, squared = dot(center, u), dot(center, v), dot(center, center) + radius * radius
+    # Nothing on the axis, as far as these digits tell. Elsewhere u is turned to point away from the receiver.
+    aside = cu * cu + cv * cv
+    aside = aside.sqrt() if aside > 0 else arb(0)
+    if aside > 0:
+        c, s = cu / aside, cv / aside
+        u, v = plus(times(u, c), times(v, s)), minus(times(v, c), times(u, s))
+    swing = 2 * radius * aside
+    if not squared > swing:
+        # On the rim, where there is no limit.
+        return arb("nan")
     middle = dot(normal, center)
     nu, nv = dot(normal, u), dot(normal, v)
     reach = radius * (nu * nu + nv * nv).sqrt()
     cut = abs(middle) < reach
     if middle < 0 and not cut:
         return arb(0)
-    # On the rim V = center + radius (u cos f + v sin f); all is a trigonometric polynomial of first degree.
-    highest = arb.atan2(nv, nu) if cut else arb(0)
+    # On the rim V = center - radius (u cos f + v sin f), f counts from where it is nearest to the receiver and the
+    # integrand may be nearly singular. All is a trigonometric polynomial of first degree.
+    highest = arb(0)
+    if cut:
+        # Away from the branch cut.
+        highest = arb.atan2(nv, nu) + arb.pi() if nu > 0 else arb.atan2(-nv, -nu)
     half = (-middle / reach).acos() if cut else arb.pi()
     first, last = highest - half, highest + half
-    cu, cv, squared = dot(center, u), dot(center, v), dot(center, center) + radius * radius
-    # Nothing on the axis, as far as these digits tell.
-    aside = cu * cu + cv * cv
-    swing = 2 * radius * aside.sqrt() if aside > 0 else arb(0)
-    if not squared > swing:
-        # On the rim, where there is no limit.
-        return arb("nan")
-    # Angles f count from where the rim is nearest to the receiver and the integrand may be nearly singular.
-    nearest = arb.atan2(cv, cu) + arb.pi() if swing > 0 else arb(0)
-    cosine, sine = nearest.cos(), nearest.sin()
-    along, across = dot(normal, cross(center, v)) * radius, -dot(normal, cross(center, u)) * radius
+    along, across = -dot(normal, cross(center, v)) * radius, dot(normal, cross(center, u)) * radius
     constant = radius**2 * dot(normal, cross(u, v))
-    along, across = along * cosine + across * sine, across * cosine - along * sine
 
     def far(f):
         return (constant + along * f.cos() + across * f.sin()) / (squared - swing * f.cos())
@@ -73,12 +77,12 @@ def covered(center, u, v, radius, normal):
         numerator = constant * (1 + w * w) + along * (1 - w * w) + 2 * across * w
         return 2 * narrow * numerator / ((1 + w * w) * (squared - swing) * y.cosh())
 
-    total, start = arb(0), first - nearest
-    while start < last - nearest:
+    total, start = arb(0), first
+    while start < last:
         # Quarters of the rim: every other one is near.
         turn = math.floor(float(start / arb.pi()) + 0.5 + 1e-12)
         end = (turn + 0.5) * arb.pi()
-        end = end if end < last - nearest else last - nearest
+        end = end if end < last else last
         if turn % 2 or not swing > 0:
             total += integral(far, start, end)
         else:
@@ -88,7 +92,7 @@ def covered(center, u, v, radius, normal):
             break
         start = end
     if cut:
-        start, end = (plus(center, times(plus(times(u, f.cos()), times(v, f.sin())), radius)) for f in (first, last))
+        start, end = (plus(center, times(plus(times(u, f.cos()), times(v, f.sin())), -radius)) for f in (first, last))
         total += arb.atan2(dot(normal, cross(end, start)), dot(end, start))
     return total
 

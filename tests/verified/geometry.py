@@ -1,6 +1,7 @@
 """What the references share: vectors in ball arithmetic, and strategies for shapes and receivers."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from flint import acb, arb, ctx
@@ -51,7 +52,7 @@ def unit(a):
 def integral(function, low, high, pieces=()):
     """Integral of an analytic function of one `acb`, cut at `pieces`, as a ball that holds the truth."""
     ends = [arb(low), *pieces, arb(high)]
-    return sum((acb.integral(lambda z, _: function(z), a, b).real for a, b in zip(ends, ends[1:])), arb(0))
+    return sum((acb.integral(lambda z, _: function(z), a, b).real for a, b in pairwise(ends)), arb(0))
 
 
 def number(value, digits=14):

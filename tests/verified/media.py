@@ -212,7 +212,7 @@ FORMS = [
         share=0.01,
     ),
     Form("Single scattering of a point light", airlights(), airlight, exact_airlight, share=0.01),
-    Form("Single scattering of parallel light", beams(), beam, exact_beam, share=0.01),
+    Form("Single scattering of parallel light", beams(), beam, exact_beam, share=0.03),
     Form(
         "H function of a half-space",
         st.tuples(

@@ -1,23 +1,20 @@
 """Irradiance of polygons against the definition as a contour integral, in ball arithmetic.
 
 Directions omega above the horizon, weighted with n . omega, are what their projection along n covers of the unit disk
-around the receiver [Nusselt 1928]. That area is half the integral of n . (omega x d omega) along its boundary: here, edge
-by edge, by rigorous quadrature of n . (V x dV) / |V|^2. Where the polygon's boundary passes through the horizon, the
+around the receiver [Nusselt 1928]. That area is half the integral of n . (omega x d omega) along its boundary: here,
+edge by edge, by rigorous quadrature of n . (V x dV) / |V|^2. Where the polygon's boundary passes through the horizon, the
 boundary goes on along the horizon's circle, which adds half its angle.
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from flint import arb
 from hypothesis import assume
 from hypothesis import strategies as st
 from verification import Form
-
-from oracle import emitters, shapes
-from oracle.irradiances import irradiance
 from verified.geometry import (
-    ball,
     balls,
     between,
     cross,
@@ -35,6 +32,9 @@ from verified.geometry import (
     unit,
 )
 
+from oracle import emitters, shapes
+from oracle.irradiances import irradiance
+
 
 def exact(configuration):
     """Irradiance of radiance 1, or None where it is not known to which side of the plane the receiver is."""
@@ -43,7 +43,7 @@ def exact(configuration):
     offsets = [minus(balls(vertex), p) for vertex in vertices]
     relative = [minus(balls(vertex), balls(vertices[0])) for vertex in vertices]
     area = [arb(0)] * 3
-    for a, b in zip(relative, relative[1:], strict=False):
+    for a, b in pairwise(relative):
         area = plus(area, cross(a, b))
     height = -dot(area, offsets[0]) / norm(area)
     if height == 0:

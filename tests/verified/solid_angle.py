@@ -177,5 +177,5 @@ FORMS = [
     Form("solid angle of a sphere", spheres(), of(Sphere), cap),
     Form("solid angle of a cone", between(1e-9, math.pi), of_cone,
          lambda angle: number(2 * arb.pi() * (1 - ball(angle).cos()))),
-    Form("plane angle of a segment", segments(), of_segment, angle_of_segment),
+    Form("plane angle of a segment", segments(), of_segment, angle_of_segment, share=0.01),
 ]  # fmt: skip

@@ -311,10 +311,10 @@ def between_edges(a, b, c, d):
 
 
 FORMS = [
-    Form("view factor of parallel rectangles", parallel(), computed, exact_parallel, share=0.03),
+    Form("view factor of parallel rectangles", parallel(), computed, exact_parallel, share=0.06),
     Form("view factor of perpendicular rectangles", perpendicular(), computed, exact_perpendicular, share=0.05),
     Form("view factor of coaxial disks", coaxial(), lambda c: computed(disks(c)), exact_disks),
     Form("view factor from a sphere to a disk", spheres(), lambda c: computed(sphere_and_disk(c)), exact_sphere),
-    Form("view factor by crossed strings", strips(), crossed, exact_strings, share=0.03),
+    Form("view factor by crossed strings", strips(), crossed, exact_strings, share=0.05),
     Form("view factor of triangles", triangles(), polygons, exact_triangles, share=0.05),
 ]
