@@ -2,8 +2,8 @@
 
 Directions omega above the horizon, weighted with n . omega, are what their projection along n covers of the unit disk
 around the receiver [Nusselt 1928]. That area is half the integral of n . (omega x d omega) along its boundary: here,
-edge by edge, by rigorous quadrature of n . (V x dV) / |V|^2. Where the polygon's boundary passes through the horizon, the
-boundary goes on along the horizon's circle, which adds half its angle.
+edge by edge, by rigorous quadrature of n . (V x dV) / |V|^2. Where the polygon's boundary passes through the horizon,
+it goes on along the horizon's circle, which adds half its angle.
 """
 
 import math
