@@ -6,6 +6,7 @@ Wavelengths are in nanometres. colour-science is loaded when first needed, since
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,6 +51,13 @@ class Spectrum:
         return np.asarray(result)
 
 
+def _load_colour() -> None:
+    """Load colour-science, and take back that it makes NumPy print everywhere as its version 1.13 did."""
+    options = np.get_printoptions()
+    import_module("colour")
+    np.set_printoptions(**options)
+
+
 def illuminant(name: str) -> Spectrum:
     """Relative spectral power of a standard illuminant, such as A, D65 or FL2 [CIE 15].
 
@@ -58,6 +66,7 @@ def illuminant(name: str) -> Spectrum:
     InvalidArgument
         If colour-science knows no illuminant of this name.
     """
+    _load_colour()
     from colour import SDS_ILLUMINANTS
 
     return _spectrum(_known("name", name, SDS_ILLUMINANTS))
@@ -65,6 +74,7 @@ def illuminant(name: str) -> Spectrum:
 
 def photopic_efficiency() -> Spectrum:
     """Spectral luminous efficiency V(lambda) of photopic vision, 360 to 830 nm in steps of 1 nm [CIE 1924]."""
+    _load_colour()
     from colour.colorimetry import SDS_LEFS_PHOTOPIC
 
     return _spectrum(SDS_LEFS_PHOTOPIC["CIE 1924 Photopic Standard Observer"])
@@ -96,6 +106,7 @@ def reflectance_spectrum(rgb: ArrayLike, space: str = "sRGB") -> Spectrum:
     A sigmoid of a quadratic polynomial in the wavelength [Jakob and Hanika 2019], fitted by colour-science, in about
     half a second. `reflectance_rgb` returns the colour within 1e-3, for most colours within 1e-4.
     """
+    _load_colour()
     from colour.recovery import XYZ_to_sd_Jakob2019
 
     colour = finite("rgb", rgb)
@@ -126,6 +137,7 @@ def reflectance_rgb(reflectance: Spectrum, space: str = "sRGB") -> Floats:
     InvalidArgument
         If a value exceeds 1, or the space or its white is unknown.
     """
+    _load_colour()
     from colour import SpectralDistribution
     from colour.colorimetry import sd_to_XYZ_integration
 
@@ -146,6 +158,7 @@ def rgb_space(name: str) -> RGB_Colourspace:
     InvalidArgument
         If there is none.
     """
+    _load_colour()
     from colour import RGB_COLOURSPACES
 
     space: RGB_Colourspace = _known("space", name, RGB_COLOURSPACES)
@@ -154,6 +167,7 @@ def rgb_space(name: str) -> RGB_Colourspace:
 
 def _observed(space: str) -> tuple[RGB_Colourspace, Any, SpectralDistribution]:
     """A colour space, the CIE 1931 observer, and the space's white on the observer's wavelengths."""
+    _load_colour()
     from colour import MSDS_CMFS, SDS_ILLUMINANTS
     from colour.recovery.jakob2019 import SPECTRAL_SHAPE_JAKOB2019
 

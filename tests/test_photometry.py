@@ -174,6 +174,15 @@ def test_an_unknown_illuminant_is_refused():
         illuminant("D66")
 
 
+def test_colour_science_does_not_change_how_numpy_prints():
+    program = (
+        "import numpy as np, oracle.spectra as s; before = np.get_printoptions(); s.illuminant('A');"
+        "assert np.get_printoptions() == before"
+    )
+    finished = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert finished.returncode == 0, finished.stderr
+
+
 def test_no_warning_escapes_and_colour_science_waits_until_it_is_needed():
     program = (
         "import sys, oracle.photometry as p, oracle.spectra as s; p.luminance([1, 1, 1]);"

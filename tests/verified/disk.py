@@ -153,5 +153,5 @@ def near_the_rim(draw):
 
 FORMS = [
     Form("disk, anywhere", placed(receivers()), computed, exact, share=0.005),
-    Form("disk, receiver next to the rim", placed(near_the_rim()), computed, exact, share=0.5),
+    Form("disk, receiver next to the rim", placed(near_the_rim()), computed, exact, share=0.7),
 ]
