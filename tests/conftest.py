@@ -5,6 +5,7 @@ import os
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from graders.grading import expectation_of
@@ -88,3 +89,10 @@ def right_image():
         return f"PF\n{width} {height}\n-1.0\n".encode() + image[::-1].astype("<f4").tobytes()
 
     return make
+
+
+@pytest.fixture(autouse=True)
+def _numpy_prints_as_ever():
+    """colour-science, which some tests import by itself, changes how NumPy prints."""
+    with np.printoptions(legacy=False):
+        yield
