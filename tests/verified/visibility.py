@@ -251,5 +251,5 @@ def configurations(draw, nearest, furthest, most):
 FORMS = [
     Form("visibility: polygon past one occluder", configurations(-1, 1, 1), computed, exact, share=0.12),
     Form("visibility: polygon past up to four occluders", configurations(-1, 1, 4), computed, exact, share=0.12),
-    Form("visibility: near and far", configurations(-6, 6, 2), computed, exact, share=0.3),
+    Form("visibility: near and far", configurations(-6, 6, 2), computed, exact, share=0.5),
 ]
