@@ -142,22 +142,37 @@ class Sphere:
 class Mesh:
     """Triangles, each with its front on the side from which its corners go round counter-clockwise.
 
-    Vertices [m], shape (V, 3), and indices into them, shape (M, 3).
+    Vertices [m], shape (V, 3), and indices into them, shape (M, 3). `normals`, shape (V, 3), bend the directions in which
+    renderers shade it, and `uv`, shape (V, 2), places textures on it; closed forms need neither.
     """
 
     vertices: Floats
     triangles: Integers
+    normals: Floats | None = None
+    uv: Floats | None = None
 
     def __post_init__(self) -> None:
         vertices = finite("vertices", self.vertices, (3,))
         if vertices.ndim != 2 or len(vertices) < 3:
             raise InvalidArgument(f"vertices has shape {vertices.shape}, a mesh needs (V, 3) with V >= 3")
-        replace(self, vertices=vertices, triangles=indices("triangles", self.triangles, len(vertices)))
-        for index, triangle in enumerate(self.triangles):
-            try:
-                Polygon(vertices[triangle])
-            except InvalidArgument as error:
-                raise InvalidArgument(f"triangles[{index}] {triangle.tolist()}: {error}") from None
+        triangles = indices("triangles", self.triangles, len(vertices))
+        replace(self, vertices=vertices, triangles=triangles)
+        a, b, c = (vertices[triangles[:, i]] for i in range(3))
+        b, c = b - a, c - a
+        size = np.maximum(np.abs(b), np.abs(c)).max(axis=1)
+        flat = np.flatnonzero(np.linalg.norm(np.cross(b, c), axis=1) <= 1e-14 * size**2)
+        if flat.size:
+            raise InvalidArgument(f"triangles[{flat[0]}] {triangles[flat[0]].tolist()}: vertices enclose no area")
+        if self.normals is not None:
+            replace(self, normals=self._for_each_vertex("normals", direction("normals", self.normals), 3))
+        if self.uv is not None:
+            replace(self, uv=self._for_each_vertex("uv", finite("uv", self.uv), 2))
+
+    def _for_each_vertex(self, name: str, value: Floats, width: int) -> Floats:
+        wanted = (len(self.vertices), width)
+        if value.shape != wanted:
+            raise InvalidArgument(f"{name} has shape {value.shape}, it must be {wanted}, one row for each vertex")
+        return value
 
     @property
     def polygons(self) -> tuple[Polygon, ...]:
