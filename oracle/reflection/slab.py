@@ -5,7 +5,9 @@ and the medium is the same on both sides. A ray meets both faces at angles for w
 geometric series over its internal reflections gives R = 2 r / (1 + r) and T = (1 - r) / (1 + r) [Stokes 1862].
 
 Each polarisation keeps its own r inside the slab. A renderer that knows only the mean reflectance sums the series with
-it and legitimately arrives at something else, largest near Brewster's angle: `slab_without_polarisation`.
+it and legitimately arrives at something else: `slab_without_polarisation`. At Brewster's angle, where
+``r_s = ((n^2 - 1)/(n^2 + 1))^2`` and ``r_p = 0``, glass of index 1.5 lets 169/194 = 0.8711 through in truth and
+313/363 = 0.8623 without polarisation.
 """
 
 from __future__ import annotations
