@@ -17,6 +17,9 @@ from oracle.emitters import Receivers
 from oracle.expectation import Expectation, Provenance
 from oracle.irradiances import irradiance
 from reference_scenes import model
+from reference_scenes.diffuse_scene import DiffuseScene, Emitter, Light, NoClosedForm, diffuse_scene, pinhole
+
+__all__ = ["NoClosedForm", "camera_rays", "closed_form", "film_radiance", "hit_shape", "require_closed_form"]
 
 # A ray that starts on a surface must not meet it again; relative to the size of the coordinates involved.
 _RAY_EPSILON = 1e-9
@@ -27,16 +30,12 @@ _WORST_ERROR = 5e-4
 _MIX = 6364136223846793005
 
 
-class NoClosedForm(ValueError):
-    """The scene holds something that no closed form here covers; the message names it."""
-
-
 # ------------------------------------------------------------------------------------------------ camera
 
 
 def camera_rays(scene: model.Scene, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Rays through film positions (pixel (0, 0) spans [0, 1] x [0, 1], top left); directions are not normalised."""
-    camera, film = scene.camera, scene.film
+    camera, film = pinhole(scene), scene.film
     origin = np.array(camera.origin)
     forward = np.array(camera.target) - origin
     forward /= np.linalg.norm(forward)
@@ -82,7 +81,7 @@ def hit_shape(
             return t, normals[face], face
 
 
-def _oracle_emitter(emitter: model.Emitter) -> emitters.Emitter:
+def _oracle_emitter(emitter: Emitter) -> emitters.Emitter:
     """The emitter of `oracle.emitters` that shines like one of the scene."""
     match emitter:
         case model.PointEmitter():
@@ -99,7 +98,7 @@ def _oracle_emitter(emitter: model.Emitter) -> emitters.Emitter:
             return emitters.Directional(_unit(emitter.direction), np.array(emitter.irradiance))
         case model.ConstantEmitter():
             return emitters.Constant(np.array(emitter.radiance))
-        case model.AreaEmitter():
+        case Light():
             radiance = np.array(emitter.radiance)
             match emitter.shape:
                 case model.Rectangle() as shape:
@@ -181,12 +180,15 @@ def require_closed_form(scene: model.Scene) -> None:
     Raises
     ------
     NoClosedForm
-        If a diffuse surface could light another or itself, or if anything could hide part of an area emitter or of
-        the environment, or if the pixel filter is not a box. The message names the parts of the scene.
+        If there is more than diffuse surfaces and uniform emitters, a diffuse surface could light another or itself,
+        anything could hide part of an area emitter or of the environment, the view is not a perspective one, or the
+        pixel filter is not a box. The message names the parts of the scene.
     """
-    if not isinstance(scene.film.filter, model.BoxFilter):
-        raise NoClosedForm(f"/film/filter is {scene.film.filter.type}; closed forms need the box filter")
-    reflecting = [(i, o) for i, o in enumerate(scene.objects) if max(o.material.reflectance) > 0]
+    _require_unhidden(diffuse_scene(scene))
+
+
+def _require_unhidden(scene: DiffuseScene) -> None:
+    reflecting = [(i, surface) for i, surface in enumerate(scene.surfaces) if max(surface.reflectance) > 0]
     for i, receiver in reflecting:
         where = f"/objects/{i}/shape"
         plane = _plane_of(receiver.shape)
@@ -196,14 +198,12 @@ def require_closed_form(scene: model.Scene) -> None:
             if k != i and not (plane is not None and plane.has_behind(other.shape)):
                 raise NoClosedForm(f"{where} and /objects/{k}/shape both reflect and may light each other")
 
-    solids = [(f"/objects/{i}/shape", o.shape) for i, o in enumerate(scene.objects)]
-    solids += [
-        (f"/emitters/{i}/shape", e.shape) for i, e in enumerate(scene.emitters) if isinstance(e, model.AreaEmitter)
-    ]
+    solids = [(f"/objects/{i}/shape", surface.shape) for i, surface in enumerate(scene.surfaces)]
+    solids += [(f"/emitters/{i}/shape", e.shape) for i, e in enumerate(scene.emitters) if isinstance(e, Light)]
     for i, emitter in enumerate(scene.emitters):
-        if not isinstance(emitter, model.AreaEmitter | model.ConstantEmitter):
+        if not isinstance(emitter, Light | model.ConstantEmitter):
             continue
-        light_plane = _plane_of(emitter.shape) if isinstance(emitter, model.AreaEmitter) else None
+        light_plane = _plane_of(emitter.shape) if isinstance(emitter, Light) else None
         for k, receiver in reflecting:
             receiver_plane = _plane_of(receiver.shape)
             for name, solid in solids:
@@ -215,7 +215,7 @@ def require_closed_form(scene: model.Scene) -> None:
                 if receiver_plane is not None and receiver_plane.has_behind(solid):
                     continue
                 raise NoClosedForm(f"{name} may hide /emitters/{i} from /objects/{k}")
-        if isinstance(emitter, model.AreaEmitter) and isinstance(emitter.shape, model.Mesh) and light_plane is None:
+        if isinstance(emitter, Light) and isinstance(emitter.shape, model.Mesh) and light_plane is None:
             raise NoClosedForm(f"/emitters/{i}/shape is a mesh of several triangles, which may hide each other")
 
 
@@ -235,12 +235,13 @@ def film_radiance(scene: model.Scene) -> pixels.Image:
     NoClosedForm
         As `require_closed_form`.
     """
-    require_closed_form(scene)
-    shapes = [o.shape for o in scene.objects]
-    lights = [e for e in scene.emitters if isinstance(e, model.AreaEmitter)]
+    diffuse = diffuse_scene(scene)
+    _require_unhidden(diffuse)
+    shapes = [surface.shape for surface in diffuse.surfaces]
+    lights = [e for e in diffuse.emitters if isinstance(e, Light)]
     shapes += [e.shape for e in lights]
     background = np.zeros(3)
-    for emitter in scene.emitters:
+    for emitter in diffuse.emitters:
         if isinstance(emitter, model.ConstantEmitter):
             background += emitter.radiance
 
@@ -260,23 +261,23 @@ def film_radiance(scene: model.Scene) -> pixels.Image:
         radiance = np.zeros((len(x), 3))
         radiance[surface == -1] = background
         lighting = np.zeros(len(x), dtype=np.int64)
-        for index, scene_object in enumerate(scene.objects):
+        for index, seen_surface in enumerate(diffuse.surfaces):
             seen = (surface == index) & front
-            if seen.any() and max(scene_object.material.reflectance) > 0:
+            if seen.any() and max(seen_surface.reflectance) > 0:
                 points = origins[seen] + nearest[seen, None] * directions[seen]
                 receivers = Receivers(points, normal[seen])
-                irradiances, lighting[seen] = _direct_light(scene, shapes, receivers)
-                radiance[seen] = np.array(scene_object.material.reflectance) / np.pi * irradiances
-        for index, light in enumerate(lights, start=len(scene.objects)):
+                irradiances, lighting[seen] = _direct_light(diffuse, shapes, receivers)
+                radiance[seen] = np.array(seen_surface.reflectance) / np.pi * irradiances
+        for index, light in enumerate(lights, start=len(diffuse.surfaces)):
             radiance[(surface == index) & front] = light.radiance
         # One integer from all of them; the face separates the triangles of a mesh.
-        seen_surface = (face * (len(shapes) + 1) + surface + 1) * 2 + front
-        return radiance, lighting * _MIX + seen_surface
+        what = (face * (len(shapes) + 1) + surface + 1) * 2 + front
+        return radiance, lighting * _MIX + what
 
     return image
 
 
-def _direct_light(scene: model.Scene, shapes: list[model.Shape], receivers: Receivers) -> tuple[Floats, Integers]:
+def _direct_light(scene: DiffuseScene, shapes: list[model.Shape], receivers: Receivers) -> tuple[Floats, Integers]:
     """Irradiance (N, 3) of all emitters at receivers (N, 3), and a label of which of them are visible or cut."""
     total = np.zeros((len(receivers.points), 3))
     label = np.zeros(len(receivers.points), dtype=np.int64)
@@ -292,7 +293,7 @@ def _direct_light(scene: model.Scene, shapes: list[model.Shape], receivers: Rece
                 towards = np.broadcast_to(-np.array(emitter.direction), receivers.points.shape)
                 visible = ~_occluded(shapes, receivers.points, towards, np.inf)
                 state = visible.astype(np.int64)
-            case model.AreaEmitter():
+            case Light():
                 visible = np.ones(len(total), dtype=np.bool_)
                 state = _cut_state(emitter.shape, receivers)
             case model.ConstantEmitter():

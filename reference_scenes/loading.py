@@ -5,12 +5,14 @@ from __future__ import annotations
 import difflib
 import json
 import tomllib
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from reference_scenes.images import read_texels
 from reference_scenes.model import Scene
 
 M = TypeVar("M", bound=BaseModel)
@@ -21,21 +23,25 @@ class InvalidFile(ValueError):
 
 
 def load_scene(path: Path) -> Scene:
-    """Read a scene from native JSON.
+    """Read a scene from native JSON, with the images it names, which lie in its folder.
 
     Raises
     ------
     InvalidFile
-        If the file cannot be read or is not a scene.
+        If the file or an image cannot be read or is not a scene.
     """
-    return load_json(path, Scene)
+    return validate(_read_json(path), Scene, str(path), {"read_texels": partial(read_texels, path.parent)})
 
 
 def load_json(path: Path, kind: type[M]) -> M:
     """Read a model from a JSON file; errors as for `load_scene`."""
+    return validate(_read_json(path), kind, str(path))
+
+
+def _read_json(path: Path) -> Any:
     text = _read(path)
     try:
-        data = json.loads(text, object_pairs_hook=_without_repetition)
+        return json.loads(text, object_pairs_hook=_without_repetition)
     except json.JSONDecodeError as error:
         raise InvalidFile(f"{path}: line {error.lineno}, column {error.colno}: not JSON: {error.msg}") from None
     except _RepeatedKey as error:
@@ -45,7 +51,6 @@ def load_json(path: Path, kind: type[M]) -> M:
     except ValueError:
         # The only other complaint of the parser.
         raise InvalidFile(f"{path}: not JSON: a number has too many digits") from None
-    return validate(data, kind, str(path))
 
 
 class _RepeatedKey(ValueError):
@@ -89,8 +94,8 @@ def _read(path: Path) -> str:
         raise InvalidFile(f"{path}: {error.strerror or error}") from None
 
 
-def validate(data: Any, kind: type[M], source: str) -> M:
-    """Make a model of plain data.
+def validate(data: Any, kind: type[M], source: str, context: dict[str, Any] | None = None) -> M:
+    """Make a model of plain data; `context` is what its validators need to know beyond the data.
 
     Raises
     ------
@@ -98,7 +103,7 @@ def validate(data: Any, kind: type[M], source: str) -> M:
         Naming `source`, the JSON pointer of the first offending field, its value and what is allowed.
     """
     try:
-        return kind.model_validate(data)
+        return kind.model_validate(data, context=context)
     except ValidationError as error:
         # Several complaints often have one cause: an unknown key explains a missing one.
         details = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
@@ -113,7 +118,7 @@ def suggest(word: str, known: list[str]) -> str:
 
 
 def _explain(error: ErrorDetails, data: Any, kind: type[BaseModel]) -> str:
-    pointer, parent = _pointer(error["loc"], data)
+    pointer, parent = _pointer(error["loc"], data, error["type"] == "missing")
     value = error["input"]
     match error["type"]:
         case "missing":
@@ -122,14 +127,14 @@ def _explain(error: ErrorDetails, data: Any, kind: type[BaseModel]) -> str:
             key = str(error["loc"][-1])
             allowed = sorted({alias for model in _models_at(error["loc"][:-1], data, kind) for alias in _keys(model)})
             return f"{pointer} is not a known key; {suggest(key, allowed)}"
-        case "union_tag_invalid" | "union_tag_not_found":
+        case "union_tag_invalid" | "union_tag_not_found" if isinstance(parent, dict):
             tags = [model.model_fields["type"].default for model in _models_at(error["loc"], data, kind)]
-            if isinstance(parent, dict) and "type" not in parent:
+            if "type" not in parent:
                 return f"{pointer}/type is missing; known: {', '.join(tags)}"
-            found = parent["type"] if isinstance(parent, dict) else parent
+            found = parent["type"]
             meant = suggest(found if isinstance(found, str) else "", tags)
             return f"{pointer}/type: {_shown(found)} is not a known type; {meant}"
-        case "model_type" | "model_attributes_type":
+        case "model_type" | "model_attributes_type" | "union_tag_not_found":
             return f"{pointer}: {_shown(value)} is not an object"
         case "value_error":
             message = str(error["ctx"]["error"])
@@ -139,14 +144,14 @@ def _explain(error: ErrorDetails, data: Any, kind: type[BaseModel]) -> str:
             return f"{pointer}: {_shown(value)}: {message}"
 
 
-def _pointer(location: tuple[int | str, ...], data: Any) -> tuple[str, Any]:
+def _pointer(location: tuple[int | str, ...], data: Any, last_is_missing: bool) -> tuple[str, Any]:
     """JSON pointer of an error and the value there; pydantic's names of union members are left out."""
     parts: list[str] = []
     current = data
     for index, part in enumerate(location):
         if _has(current, part):
             current = current[part]
-        elif index < len(location) - 1 or (isinstance(current, dict) and current.get("type") == part):
+        elif not (last_is_missing and index == len(location) - 1):
             continue
         parts.append(_printable(str(part)).replace("~", "~0").replace("/", "~1"))
     return "/" + "/".join(parts), current

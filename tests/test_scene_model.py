@@ -5,6 +5,7 @@ import os
 import string
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,6 +25,10 @@ FILM = {"width": 4, "height": 3}
 POINT = {"type": "point", "position": [0, 0, 1], "intensity": [1, 1, 1]}
 GREY = {"reflectance": [0.5, 0.5, 0.5]}
 SPHERE = {"type": "sphere", "center": [0, 0, 0], "radius": 1}
+CHECKER = {"type": "checker", "even": [1, 1, 1], "odd": [0, 0, 0]}
+FLAT = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 5]]
+KNOWN = "diffuse, mirror, dielectric, conductor, rough_conductor, rough_dielectric, phong, plastic, two_sided, mix"
+SENSORS = "perspective, orthographic, irradiance_meter, radiance_meter"
 TRIANGLE = {"type": "mesh", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}
 
 
@@ -74,12 +79,42 @@ def rectangles(draw):
 
 
 @st.composite
-def meshes(draw):
+def meshes(draw, textured=False):
     count = draw(st.integers(3, 6))
     vertices = tuple((float(i), float(i * i), draw(st.floats(-1, 1))) for i in range(count))
     corner = st.integers(0, count - 1)
     triangles = draw(st.lists(st.tuples(corner, corner, corner).filter(lambda t: len(set(t)) == 3), min_size=1))
-    return model.Mesh(vertices=vertices, triangles=tuple(triangles))
+    of_each = {"min_size": count, "max_size": count}
+    places = st.lists(st.tuples(numbers, numbers), **of_each).map(tuple)
+    return model.Mesh(
+        vertices=vertices,
+        triangles=tuple(triangles),
+        normals=draw(st.none() | st.lists(directions, **of_each).map(tuple)),
+        uv=draw(places if textured else st.none() | places),
+    )
+
+
+@st.composite
+def instances(draw, textured=False):
+    scales = st.floats(0.5, 2) | st.floats(-2, -0.5)
+    rows = [[draw(scales) if i == j else draw(st.floats(-0.1, 0.1)) for j in range(3)] for i in range(3)]
+    transform = tuple((*row, draw(numbers)) for row in rows)
+    return model.Instances(mesh=draw(meshes(textured)), transforms=(transform,))
+
+
+@st.composite
+def images(draw, largest):
+    height, width = draw(st.integers(1, 3)), draw(st.integers(1, 3))
+    of_row = {"min_size": width, "max_size": width}
+    return draw(st.lists(st.lists(st.tuples(*[st.floats(0, largest)] * 3), **of_row), min_size=height, max_size=height))
+
+
+def textures(largest):
+    colour = st.tuples(*[st.floats(0, largest)] * 3)
+    return st.one_of(
+        st.builds(model.Bitmap, texels=images(largest), smooth=st.booleans()),
+        st.builds(model.Checker, even=colour, odd=colour, columns=lengths, rows=lengths),
+    )
 
 
 shapes = st.one_of(
@@ -89,7 +124,8 @@ shapes = st.one_of(
     meshes(),
 )
 emitters = st.one_of(
-    st.builds(model.AreaEmitter, shape=shapes, radiance=spectra),
+    st.builds(model.AreaEmitter, shape=shapes, radiance=spectra, two_sided=st.booleans()),
+    st.builds(model.AreaEmitter, shape=rectangles() | meshes(textured=True), radiance=textures(1e9)),
     st.builds(model.PointEmitter, position=vectors, intensity=spectra),
     st.builds(
         model.SpotEmitter,
@@ -99,16 +135,33 @@ emitters = st.one_of(
         beam_width=st.floats(0.1, 40),
         cutoff_angle=st.floats(40.5, 89),
     ),
+)
+distant = st.one_of(
     st.builds(model.DirectionalEmitter, direction=directions, irradiance=spectra),
     st.builds(model.ConstantEmitter, radiance=spectra),
+    st.builds(model.SkyEmitter, up=directions, zenith=spectra, horizon=st.none() | spectra),
+    st.builds(lambda radiance, x: model.ImageEmitter(radiance=radiance, front=(x, 1.0, 0.0)), images(1e9), numbers),
 )
-cameras = st.builds(
-    lambda origin, offset, fov_x: model.Camera(
-        origin=origin, target=(origin[0] + offset, origin[1] + 1.0, origin[2]), fov_x=fov_x
-    ),
-    vectors,
-    st.floats(-10, 10),
-    st.floats(0.1, 179),
+media = st.builds(model.Medium, absorption=spectra, scattering=spectra, asymmetry=st.floats(-0.99, 0.99))
+
+
+def looking(kind, **fields):
+    """A camera somewhere that looks somewhere else."""
+    return st.builds(
+        lambda origin, offset, **more: kind(
+            origin=origin, target=(origin[0] + offset, origin[1] + 1.0, origin[2]), **more
+        ),
+        vectors,
+        st.floats(-10, 10),
+        **fields,
+    )
+
+
+cameras = st.one_of(
+    looking(model.Camera, fov_x=st.floats(0.1, 179)),
+    looking(model.OrthographicCamera, width=lengths),
+    st.builds(model.IrradianceMeter, surface=rectangles()),
+    st.builds(model.RadianceMeter, origin=vectors, direction=directions),
 )
 films = st.builds(
     model.Film,
@@ -116,12 +169,48 @@ films = st.builds(
     height=st.integers(1, 16384),
     filter=st.one_of(st.builds(model.BoxFilter), st.builds(model.GaussianFilter, stddev=st.floats(0.01, 2))),
 )
-materials = st.builds(model.Diffuse, reflectance=albedos)
-objects = st.builds(model.Object, shape=shapes, material=materials)
+
+
+def materials(reflectances):
+    roughness, eta, exponent = st.floats(1e-4, 1), st.floats(1.01, 3), st.floats(0, 10_000)
+    opaque = st.one_of(
+        st.builds(model.Diffuse, reflectance=reflectances),
+        st.builds(model.Mirror, reflectance=reflectances),
+        st.builds(model.Conductor, eta=spectra, k=spectra),
+        st.builds(model.RoughConductor, eta=spectra, k=spectra, alpha=roughness),
+        st.builds(model.Phong, reflectance=reflectances, exponent=exponent),
+        st.builds(model.Plastic, reflectance=reflectances, eta=eta),
+    )
+    clear = st.builds(model.Dielectric, eta=eta) | st.builds(model.RoughDielectric, eta=eta, alpha=roughness)
+    mixed = st.builds(model.Mix, first=opaque, second=opaque, weight=st.floats(0, 1))
+    return st.one_of(
+        opaque,
+        clear,
+        mixed,
+        st.builds(model.Mix, first=opaque, second=clear, weight=st.floats(0, 1)),
+        st.builds(model.TwoSided, front=opaque | mixed, back=st.none() | opaque | mixed),
+    )
+
+
+objects = st.one_of(
+    st.builds(model.Object, shape=shapes | instances(), material=materials(albedos)),
+    st.builds(
+        model.Object,
+        shape=st.one_of(rectangles(), meshes(textured=True), instances(textured=True)),
+        material=materials(textures(1)),
+    ),
+)
 scenes = st.builds(
-    Scene,
+    lambda near, far, **parts: Scene(emitters=(*near, *far), **parts),
     objects=st.lists(objects, max_size=3).map(tuple),
-    emitters=st.lists(emitters, max_size=3).map(tuple),
+    near=st.lists(emitters, max_size=3),
+    far=st.lists(distant, max_size=1),
+    camera=cameras,
+    film=films,
+) | st.builds(
+    Scene,
+    emitters=st.lists(emitters, max_size=2).map(tuple),
+    medium=media,
     camera=cameras,
     film=films,
 )
@@ -152,7 +241,7 @@ def test_whole_numbers_are_numbers():
 def every_model():
     found = [model.Model]
     for kind in found:
-        found += [k for k in kind.__subclasses__() if k.__module__ == "reference_scenes.model"]
+        found += [k for k in kind.__subclasses__() if k.__module__.startswith("reference_scenes.model.")]
     return found[1:]
 
 
@@ -173,6 +262,27 @@ def test_a_scene_cannot_be_changed():
     hash(scene)
 
 
+def test_texels_cannot_be_changed_and_are_equal_if_their_values_are():
+    texels, same, other = (model.Texels(np.full((1, 2, 3), value)) for value in (0.5, 0.5, 0.25))
+    assert texels == same
+    assert hash(texels) == hash(same)
+    assert texels != other
+    with pytest.raises(ValueError, match="read-only"):
+        texels.array[0, 0, 0] = 1.0
+
+
+def test_several_constant_environments_stay_valid():
+    constant = {"type": "constant", "radiance": [1, 1, 1]}
+    assert len(Scene.model_validate(with_emitters(constant, constant)).emitters) == 2
+
+
+def test_a_scene_of_the_first_version_is_written_as_it_ever_was():
+    scene = FAMILIES["rectangle-overhead"].member(0)
+    written = json.loads(scene.model_dump_json())
+    assert set(written) == {"format", "version", "objects", "emitters", "camera", "film"}
+    assert set(written["emitters"][0]) == {"type", "shape", "radiance"}
+
+
 # --------------------------------------------------------------------------------------------------- errors
 
 
@@ -191,7 +301,7 @@ def changed_camera(**values):
         (
             with_object(SPHERE, {"reflectance": [0.5, 1.25, 0.5]}),
             "/objects/0/material/reflectance: [0.5, 1.25, 0.5] has a component outside [0, 1];"
-            " a diffuse surface reflects between none and all of the light",
+            " a surface reflects between none and all of the light",
         ),
         (
             with_emitters(POINT | {"intensity": [1, "2", 3]}),
@@ -206,7 +316,7 @@ def changed_camera(**values):
         (a_scene(emiters=[]), "/emiters is not a known key; did you mean 'emitters'?"),
         (
             a_scene(xyz=1),
-            "/xyz is not a known key; known: camera, emitters, film, format, objects, version",
+            "/xyz is not a known key; known: camera, emitters, film, format, medium, objects, version",
         ),
         (
             with_emitters({"type": "point", "position": [0, 0, 1], "intensitiy": [1, 1, 1]}),
@@ -222,11 +332,11 @@ def changed_camera(**values):
         ),
         (
             a_scene(**{"a/b~c": 1}),
-            "/a~1b~0c is not a known key; known: camera, emitters, film, format, objects, version",
+            "/a~1b~0c is not a known key; known: camera, emitters, film, format, medium, objects, version",
         ),
         (
             a_scene(**{"a\n\u202eb": 1}),
-            "/a\\n\\u202eb is not a known key; known: camera, emitters, film, format, objects, version",
+            "/a\\n\\u202eb is not a known key; known: camera, emitters, film, format, medium, objects, version",
         ),
         # What is missing, or of another kind.
         ({"film": FILM}, "/camera is missing"),
@@ -242,11 +352,12 @@ def changed_camera(**values):
         ),
         (
             with_emitters({"type": ["area"]}),
-            '/emitters/0/type: ["area"] is not a known type; known: area, point, spot, directional, constant',
+            '/emitters/0/type: ["area"] is not a known type;'
+            " known: area, point, spot, directional, constant, sky, image",
         ),
         (
             with_emitters({"position": [0, 0, 0]}),
-            "/emitters/0/type is missing; known: area, point, spot, directional, constant",
+            "/emitters/0/type is missing; known: area, point, spot, directional, constant, sky, image",
         ),
         (
             with_emitters({"type": "area", "shape": {"type": "torus"}, "radiance": [1, 1, 1]}),
@@ -293,6 +404,119 @@ def changed_camera(**values):
         (
             with_object(TRIANGLE | {"triangles": [[0, 1, 1]]}),
             "/objects/0/shape: triangles[0] = (0, 1, 1) has no area",
+        ),
+        (
+            with_object(TRIANGLE | {"normals": [[0, 0, 1]]}),
+            "/objects/0/shape: normals has 1 entries for 3 vertices; give one for each",
+        ),
+        (
+            with_object(TRIANGLE | {"uv": [[0, 0], [1, 0], [0, 1, 2]]}),
+            "/objects/0/shape/uv/2: [0, 1, 2]: tuple should have at most 2 items after validation, not 3",
+        ),
+        (
+            with_object({"type": "instances", "mesh": TRIANGLE, "transforms": [FLAT]}),
+            "/objects/0/shape/transforms/0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 5]] has no inverse;"
+            " it flattens what it maps (and 1 more)",
+        ),
+        (with_object({"type": "instances", "transforms": [FLAT]}), "/objects/0/shape/mesh is missing (and 2 more)"),
+        (
+            with_emitters({"type": "area", "radiance": [1, 1, 1], "shape": {"type": "instances"}}),
+            '/emitters/0/shape/type: "instances" is not a known type; known: rectangle, disk, sphere, mesh',
+        ),
+        # Materials and textures.
+        (
+            with_object(SPHERE, {"type": "mirrror"}),
+            "/objects/0/material/type: \"mirrror\" is not a known type; did you mean 'mirror'?",
+        ),
+        (
+            with_object(SPHERE, {"type": "plastic", "reflectance": [0, 0, 0], "etta": 1.5}),
+            "/objects/0/material/etta is not a known key; did you mean 'eta'? (and 1 more)",
+        ),
+        (with_object(SPHERE, {"type": 5}), "/objects/0/material/type: 5 is not a known type; known: " + KNOWN),
+        (with_object(SPHERE, 5), "/objects/0/material: 5 is not an object"),
+        (with_object(SPHERE, {"reflectance": 5}), "/objects/0/material/reflectance: 5: input should be a valid tuple"),
+        (
+            with_object(SPHERE, {"type": "rough_conductor", "eta": [1, 1, 1], "k": [1, 1, 1], "alpha": 0}),
+            "/objects/0/material/alpha: 0: input should be greater than or equal to 0.0001",
+        ),
+        (
+            with_object(SPHERE, {"type": "rough_dielectric", "eta": 1, "alpha": 0.1}),
+            "/objects/0/material/eta: 1 bends no light; leave the surface out",
+        ),
+        (
+            with_object(SPHERE, {"type": "two_sided", "front": {"type": "dielectric", "eta": 1.5}}),
+            '/objects/0/material/front/type: "dielectric" is not a known type;'
+            " known: diffuse, mirror, conductor, rough_conductor, phong, plastic, mix",
+        ),
+        (
+            with_object(SPHERE, {"type": "two_sided", "front": GREY, "back": {
+                "type": "mix", "first": GREY, "second": {"type": "dielectric", "eta": 1.5}, "weight": 0.5}}),
+            "/objects/0/material: back/second lets light through; a surface with two sides must be opaque",
+        ),
+        (
+            with_object(SPHERE, {"reflectance": CHECKER}),
+            "/objects/0: material/reflectance is a texture, and a sphere has no place for it;"
+            " use a rectangle or a mesh with uv",
+        ),
+        (
+            with_object(TRIANGLE, {"type": "mix", "first": GREY, "second": {"reflectance": CHECKER}, "weight": 1}),
+            "/objects/0: material/second/reflectance is a texture, and the mesh has no uv to place it;"
+            " give uv, one pair for each vertex",
+        ),
+        (
+            with_emitters({"type": "area", "radiance": CHECKER, "shape": SPHERE}),
+            "/emitters/0: radiance is a texture, and a sphere has no place for it; use a rectangle or a mesh with uv",
+        ),
+        (
+            with_object(SPHERE, {"reflectance": CHECKER | {"type": "chequer"}}),
+            "/objects/0/material/reflectance/type: \"chequer\" is not a known type; did you mean 'checker'?",
+        ),
+        (
+            with_object(SPHERE, {"reflectance": CHECKER | {"odd": [0, 0, 2]}}),
+            '/objects/0/material/reflectance: {"type": "checker", "even": [1, 1, 1], "odd": [0, 0, 2]}'
+            " odd has a component above 1; a surface reflects at most all light",
+        ),
+        (
+            with_object(SPHERE, {"reflectance": {"type": "bitmap", "texels": [[[0, 0, 2]]]}}),
+            '/objects/0/material/reflectance: {"type": "bitmap", "texels": [[[0, 0, 2]]]}'
+            " texels go up to 2; a surface reflects at most all light, 1",
+        ),
+        (
+            with_object(SPHERE, {"reflectance": {"type": "bitmap", "texels": [[[0, 0, 0]], [[0, -1, 0]]]}}),
+            "/objects/0/material/reflectance/texels/1/0: [0, -1, 0] has a negative component;"
+            " light is at least 0 in every channel (and 1 more)",
+        ),
+        (
+            with_object(SPHERE, {"reflectance": {"type": "bitmap", "texels": [[[0, 0, 0]], [[0, 0, 0], [1, 1, 1]]]}}),
+            "/objects/0/material/reflectance/texels: [[[0, 0, 0]], [[0, 0, 0], [1, 1, 1]]] row 1 has 2 texels"
+            " and row 0 has 1; all must be as long",
+        ),
+        # Light from far away.
+        (
+            with_emitters({"type": "constant", "radiance": [1, 1, 1]}, POINT, {"type": "sky", "zenith": [1, 1, 1]}),
+            "/emitters: has environments at 0 and 2; there can be one, or several constant ones",
+        ),
+        (
+            with_emitters({"type": "image", "radiance": [[[1, 1, 1]]], "front": [1, 0, 1]}),
+            '/emitters/0: {"type": "image", "radiance": [[[1, 1, 1]]], "front": [1, 0, 1]}'
+            " up and front are not orthogonal; front is where the horizon meets column 0",
+        ),
+        (
+            with_emitters(POINT, {"type": "constant", "radiance": [1, 1, 1]}) | {
+                "medium": {"absorption": [0, 0, 0], "scattering": [1, 1, 1]}},
+            '/medium: {"absorption": [0, 0, 0], "scattering": [1, 1, 1]}'
+            " fills all space, so that no light of /emitters/1 arrives; leave one of them out",
+        ),
+        # Sensors.
+        (a_scene(camera={"type": "fisheye"}), '/camera/type: "fisheye" is not a known type; known: ' + SENSORS),
+        (
+            a_scene(camera={"type": "irradiance_meter"}),
+            "/camera/surface is missing",
+        ),
+        (
+            a_scene(camera={"type": "orthographic", "origin": [0, 0, 0], "target": [0, 0, 1], "width": 1}),
+            '/camera: {"type": "orthographic", "origin": [0, 0, 0], "target": [0, 0, 1], "width": 1}'
+            " up is parallel to the viewing direction; choose another up",
         ),
         (
             with_object(TRIANGLE | {"triangles": [[0, 1, 2.0]]}),
@@ -420,6 +644,8 @@ SCHEMA_FILE = Path(__file__).parent.parent / "docs" / "schema" / "scene.schema.j
 SCHEMA = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
 ANNOTATIONS = {"$defs", "$schema", "default", "description", "discriminator", "title"}
 TYPES = {
+    "null": lambda v: v is None,
+    "boolean": lambda v: isinstance(v, bool),
     "object": lambda v: isinstance(v, dict),
     "array": lambda v: isinstance(v, list),
     "string": lambda v: isinstance(v, str),
@@ -440,6 +666,8 @@ def conforms(value, schema):
                 valid = value == meaning and not isinstance(value, bool)
             case "oneOf":
                 valid = sum(conforms(value, option) for option in meaning) == 1
+            case "anyOf":
+                valid = any(conforms(value, option) for option in meaning)
             case "required":
                 valid = not isinstance(value, dict) or set(meaning) <= set(value)
             case "properties":
@@ -526,6 +754,17 @@ def accepted(scene):
         with_object(TRIANGLE | {"triangles": [[0, 1]]}),
         a_scene(film={"width": 0, "height": 3}),
         a_scene(film={"width": 16385, "height": 3}),
+        with_object(SPHERE, {"type": "mirror", "reflectance": [2, 0, 0]}),
+        with_object(SPHERE, {"type": "conductor", "eta": [1, 1, -1], "k": [1, 1, 1]}),
+        with_object(SPHERE, {"type": "mix", "first": GREY, "second": {"type": "mix"}, "weight": 0.5}),
+        with_object(SPHERE, {"type": "phong", "reflectance": [0, 0, 0], "exponent": -1}),
+        with_object(SPHERE, {"eta": 1.5}),
+        with_object(SPHERE, {"reflectance": {"type": "bitmap", "texels": []}}),
+        with_object(SPHERE, {"reflectance": {"type": "bitmap", "texels": [[[0, 0, -1]]]}}),
+        with_object(SPHERE, {"reflectance": CHECKER | {"columns": 0}}),
+        with_emitters({"type": "area", "shape": SPHERE, "radiance": [1, 1, 1], "two_sided": 1}),
+        a_scene(medium={"absorption": [0, 0, 0], "scattering": [0, 0, 0], "asymmetry": 1}),
+        a_scene(camera={"type": "radiance_meter", "origin": [0, 0, 0]}),
     ],
 )
 def test_schema_and_model_agree_on_what_one_field_may_hold(scene):
