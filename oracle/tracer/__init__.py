@@ -5,6 +5,40 @@
 
 try:
     from oracle.tracer._core import RayCaster, embree_version
+    from oracle.tracer.rendering import (
+        FirstHits,
+        Goal,
+        Job,
+        Method,
+        Progress,
+        Range,
+        Rendering,
+        first_hits,
+        merge,
+        render,
+    )
+    from oracle.tracer.scene import (
+        Bitmap,
+        Checker,
+        Conductor,
+        Dielectric,
+        Diffuse,
+        Film,
+        Instances,
+        IrradianceMeter,
+        Mirror,
+        Mix,
+        Object,
+        Orthographic,
+        Perspective,
+        Phong,
+        Plastic,
+        RadianceMeter,
+        RoughConductor,
+        RoughDielectric,
+        Scene,
+        TwoSided,
+    )
 except ModuleNotFoundError as error:
     raise ImportError("oracle.tracer is not built here; run `make setup` in the checkout") from error
 except ImportError as error:
@@ -15,4 +49,37 @@ except ImportError as error:
         "and reinstall render-oracle if the version of Embree has changed"
     ) from error
 
-__all__ = ["RayCaster", "embree_version"]
+__all__ = [
+    "Bitmap",
+    "Checker",
+    "Conductor",
+    "Dielectric",
+    "Diffuse",
+    "Film",
+    "FirstHits",
+    "Goal",
+    "Instances",
+    "IrradianceMeter",
+    "Job",
+    "Method",
+    "Mirror",
+    "Mix",
+    "Object",
+    "Orthographic",
+    "Perspective",
+    "Phong",
+    "Plastic",
+    "Progress",
+    "RadianceMeter",
+    "Range",
+    "RayCaster",
+    "Rendering",
+    "RoughConductor",
+    "RoughDielectric",
+    "Scene",
+    "TwoSided",
+    "embree_version",
+    "first_hits",
+    "merge",
+    "render",
+]

@@ -1,5 +1,8 @@
-// What differs between Embree 3 and 4, and nothing else: headers and the calls that trace a ray.
+// Embree: what differs between versions 3 and 4, namely headers and the calls that trace a ray, and ownership.
 #pragma once
+
+#include <memory>
+#include <type_traits>
 
 #if ORACLE_EMBREE_MAJOR >= 4
 #include <embree4/rtcore.h>
@@ -8,6 +11,14 @@
 #endif
 
 namespace oracle {
+
+struct Release {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+    void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+template <typename Handle>
+using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
 inline void closest_hit(RTCScene scene, RTCRayHit& ray) {
 #if ORACLE_EMBREE_MAJOR >= 4

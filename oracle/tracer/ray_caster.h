@@ -7,25 +7,15 @@
 #include <string>
 
 #include "embree_compat.h"
+#include "scene.h"
 
 namespace oracle {
-
-struct Vec3 {
-    float x, y, z;
-};
-
-struct Triangle {
-    uint32_t a, b, c;
-};
 
 struct Hit {
     double t;          // in units of the direction's length; infinity for a miss
     int64_t triangle;  // -1 for a miss
     float u, v;        // the hit is (1 - u - v) a + u b + v c
 };
-
-// Embree skips geometry beyond 1.8e18 without a word, so nothing may lie beyond this.
-constexpr float largest_coordinate = 1e18f;
 
 // A frozen set of triangles. Queries are const and may run on any number of threads at once.
 class RayCaster {
@@ -41,14 +31,6 @@ public:
     bool occluded(const Vec3& origin, const Vec3& direction, double t_far) const;
 
 private:
-    struct Release {
-        void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-        void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-        void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
-    };
-    template <typename Handle>
-    using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
-
     Owned<RTCDevice> device_;  // before the scene: members die in reverse order
     Owned<RTCScene> scene_;
 };

@@ -41,7 +41,7 @@ class Bitmap:
 
 @dataclass(frozen=True, eq=False)
 class Checker:
-    """Fields of two colours: `columns` and `rows` of them, together, for u and v from 0 to 1; `even` is at the origin."""
+    """Fields of two colours, `columns` and `rows` of them for u and v from 0 to 1; that at the origin is `even`."""
 
     even: Floats
     odd: Floats
@@ -107,11 +107,15 @@ class Conductor:
 
 @dataclass(frozen=True, eq=False)
 class RoughConductor:
-    """A metal of GGX facets that scatter once (height-correlated Smith); `alpha` is the root mean square slope."""
+    """A metal of GGX facets that scatter once; `alpha` is the width of the distribution of slopes [Walter et al. 2007].
+
+    Smith's masking and shadowing are correlated by height [Heitz 2014], or multiplied if `separable`.
+    """
 
     eta: Floats
     k: Floats
     alpha: float
+    separable: bool = False
 
     def __post_init__(self) -> None:
         replace(self, eta=_rgb("eta", self.eta), k=_rgb("k", self.k), alpha=_alpha(self.alpha))
@@ -119,10 +123,11 @@ class RoughConductor:
 
 @dataclass(frozen=True, eq=False)
 class RoughDielectric:
-    """An interface of GGX facets that scatter once; `eta` as for `Dielectric`, `alpha` as for `RoughConductor`."""
+    """An interface of GGX facets that scatter once; `eta` as for `Dielectric`, the rest as for `RoughConductor`."""
 
     eta: float
     alpha: float
+    separable: bool = False
 
     def __post_init__(self) -> None:
         replace(self, eta=length("eta", self.eta), alpha=_alpha(self.alpha))
@@ -169,8 +174,10 @@ class TwoSided:
     def __post_init__(self) -> None:
         for name in ("front", "back"):
             value = getattr(self, name)
-            if value is not None and not isinstance(value, Opaque):
-                raise InvalidArgument(f"{name} is a {type(value).__name__}, which has two sides already")
+            parts = (value.first, value.second) if isinstance(value, Mix) else (value,)
+            for part in parts:
+                if part is not None and not isinstance(part, Opaque):
+                    raise InvalidArgument(f"{name} is or holds a {type(part).__name__}, which has two sides already")
 
 
 @dataclass(frozen=True, eq=False)

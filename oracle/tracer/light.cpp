@@ -1,0 +1,235 @@
+#include "light.h"
+
+#include <limits>
+
+namespace oracle {
+namespace {
+
+using Kind = Light::Kind;
+
+// Above this ratio of area to squared distance from the center, the solid angle is sampled instead of the area.
+constexpr float near = 0.1f;
+
+bool is_near(const Light& l, const Vec3& from) {
+    const Vec3 center = l.kind == Kind::rectangle ? l.p + 0.5f * (l.u + l.v) : l.p + (1.0f / 3) * (l.u + l.v);
+    return l.area > near * length_squared(center - from);
+}
+
+// A rectangle as seen from a point, in the coordinates of its edges (Ureña, Fajardo and King 2013).
+struct SphericalRectangle {
+    Vec3 x, y, z;                // unit vectors along the edges, and away from the rectangle's plane
+    float x0, y0, z0, x1, y1;    // corners, z0 < 0
+    float b0, b1, k, solid_angle;
+
+    SphericalRectangle(const Light& l, const Vec3& from) {
+        const float width = length(l.u), height = length(l.v);
+        x = l.u / width, y = l.v / height, z = cross(x, y);
+        const Vec3 d = l.p - from;
+        x0 = dot(d, x), y0 = dot(d, y), z0 = dot(d, z);
+        if (z0 > 0) z = -z, z0 = -z0;
+        x1 = x0 + width, y1 = y0 + height;
+        // Normals of the planes through the eye and each edge; the angles between them.
+        const auto normal = [](float a, float b) { return a / std::sqrt(a * a + b * b); };
+        const float n0 = normal(-y0, z0), n1 = normal(x1, z0), n2 = normal(y1, z0), n3 = normal(-x0, z0);
+        const float g0 = std::acos(-n0 * n1), g1 = std::acos(-n1 * n2), g2 = std::acos(-n2 * n3), g3 = std::acos(-n3 * n0);
+        b0 = n0, b1 = n2;
+        k = 2 * pi - g2 - g3;
+        solid_angle = g0 + g1 - k;
+    }
+
+    Vec3 sample(const Vec2& u) const {
+        const float au = u.x * solid_angle + k;
+        const float fu = (std::cos(au) * b0 - b1) / std::sin(au);
+        const float cu = std::clamp(std::copysign(1 / std::sqrt(fu * fu + b0 * b0), fu), -1.0f, 1.0f);
+        const float xu = std::clamp(-(cu * z0) / safe_sqrt(1 - cu * cu), x0, x1);
+        const float d2 = xu * xu + z0 * z0;
+        const float h0 = y0 / std::sqrt(d2 + y0 * y0), h1 = y1 / std::sqrt(d2 + y1 * y1);
+        const float h = h0 + u.y * (h1 - h0);
+        const float yv = h * h < 1 - 1e-6f ? h * std::sqrt(d2) / std::sqrt(1 - h * h) : y1;
+        return xu * x + yv * y + z0 * z;
+    }
+};
+
+// A triangle as seen from a point (Arvo 1995, "Stratified Sampling of Spherical Triangles").
+struct SphericalTriangle {
+    Vec3 a, b, c;
+    float solid_angle, alpha;
+
+    SphericalTriangle(const Light& l, const Vec3& from)
+        : a(normalize(l.p - from)), b(normalize(l.p + l.u - from)), c(normalize(l.p + l.v - from)) {
+        // van Oosterom and Strackee 1983.
+        const float triple = std::fabs(dot(a, cross(b, c)));
+        solid_angle = 2 * std::atan2(triple, 1 + dot(a, b) + dot(b, c) + dot(c, a));
+        const Vec3 ab = cross(a, b), ac = cross(a, c);
+        alpha = std::atan2(length(cross(ab, ac)), dot(ab, ac));
+    }
+
+    Vec3 sample(const Vec2& u) const {
+        const float area = u.x * solid_angle;
+        const float s = std::sin(area - alpha), t = std::cos(area - alpha);
+        const float cos_alpha = std::cos(alpha), sin_alpha = std::sin(alpha), cos_c = dot(a, b);
+        const float p = t - cos_alpha, q = s + sin_alpha * cos_c;
+        const float numerator = (q * t - p * s) * cos_alpha - q, denominator = (q * s + p * t) * sin_alpha;
+        const float cos_b = denominator == 0 ? 1 : std::clamp(numerator / denominator, -1.0f, 1.0f);
+        const Vec3 towards = c - dot(c, a) * a;
+        const Vec3 moved = cos_b * a + safe_sqrt(1 - cos_b * cos_b) * normalize(towards);
+        const float z = 1 - u.y * (1 - dot(moved, b));
+        const Vec3 across = moved - dot(moved, b) * b;
+        const float l = length(across);
+        return l == 0 ? b : z * b + safe_sqrt(1 - z * z) / l * across;
+    }
+};
+
+// 1 - cos of the half angle of the cone that a sphere fills, without cancellation.
+float one_minus_cosine(const Light& l, float distance_squared) {
+    const float sine2 = l.radius * l.radius / distance_squared;
+    return sine2 / (1 + safe_sqrt(1 - sine2));
+}
+
+Color emitted(const Light& l, const std::vector<Texture>& textures, float s, float t) {
+    if (l.radiance.texture < 0) return l.radiance.constant;
+    const float r = 1 - s - t;
+    const Vec2 uv{r * l.uv[0].x + s * l.uv[1].x + t * l.uv[2].x, r * l.uv[0].y + s * l.uv[1].y + t * l.uv[2].y};
+    return l.radiance.at(textures, uv);
+}
+
+// Completes a sample at `point` that was chosen by area, or by solid angle if a density is given.
+LightSample towards(const Light& l, const Vec3& from, const Vec3& point, const Vec3& normal, const Color& radiance,
+                    float pdf_by_solid_angle = 0) {
+    const Vec3 d = point - from;
+    const float distance = length(d);
+    const float cosine = -dot(d, normal) / distance;
+    const bool behind = cosine <= 0;
+    if (!(distance > 0) || cosine == 0 || (behind && !l.two_sided)) return {};
+    const float pdf = pdf_by_solid_angle ? pdf_by_solid_angle : distance * distance / (std::fabs(cosine) * l.area);
+    return {d / distance, distance, point, behind ? -normal : normal, radiance, pdf};
+}
+
+LightSample sample_sphere(const Light& l, const Vec3& from, const Vec2& u) {
+    const Vec3 to_center = l.p - from;
+    const float d2 = length_squared(to_center), r2 = l.radius * l.radius;
+    if (d2 <= r2 * 1.000001f) {
+        // From within, or all but touching.
+        const Vec3 n = square_to_sphere(u);
+        return towards(l, from, l.p + l.radius * n, n, l.radiance.constant);
+    }
+    const float part = one_minus_cosine(l, d2);
+    const float gap = u.x * part;  // 1 - cosine of the sample's angle
+    const float sine2 = gap * (2 - gap), cosine = 1 - gap;
+    const float distance = std::sqrt(d2);
+    // Where the ray meets the sphere first, as its angle at the center (pbrt, 4th edition, section 6.2.4).
+    const float along = distance * cosine - safe_sqrt(r2 - d2 * sine2);
+    const float sine = safe_sqrt(sine2), phi = 2 * pi * u.y;
+    const Frame frame(to_center / distance);
+    const Vec3 w = frame.to_world({sine * std::cos(phi), sine * std::sin(phi), cosine});
+    const Vec3 n = normalize(along * w - to_center);
+    // At the rim the ray grazes: the side is not decided by rounding.
+    const Vec3 point = l.p + l.radius * n;
+    return {w, along, point, n, l.radiance.constant, 1 / (2 * pi * part)};
+}
+
+float spot_falloff(const Light& l, float cosine) {
+    const float angle = std::acos(std::clamp(cosine, -1.0f, 1.0f));
+    return std::clamp((l.cutoff - angle) / (l.cutoff - l.full), 0.0f, 1.0f);
+}
+
+}  // namespace
+
+LightSample sample_light(const Light& l, const std::vector<Texture>& textures, const Vec3& from, const Vec2& u) {
+    switch (l.kind) {
+        case Kind::rectangle: {
+            // From behind there is nothing to compute.
+            if (!l.two_sided && dot(from - l.p, l.n) <= 0) return {};
+            if (is_near(l, from)) {
+                const SphericalRectangle seen(l, from);
+                if (!(seen.solid_angle > 0)) return {};
+                const Vec3 point = from + seen.sample(u);
+                const Vec3 d = point - l.p;
+                const Color radiance = emitted(l, textures, dot(d, l.u) / length_squared(l.u), dot(d, l.v) / length_squared(l.v));
+                return towards(l, from, point, l.n, radiance, 1 / seen.solid_angle);
+            }
+            return towards(l, from, l.p + u.x * l.u + u.y * l.v, l.n, emitted(l, textures, u.x, u.y));
+        }
+        case Kind::triangle: {
+            if (!l.two_sided && dot(from - l.p, l.n) <= 0) return {};
+            if (is_near(l, from)) {
+                const SphericalTriangle seen(l, from);
+                if (!(seen.solid_angle > 0)) return {};
+                const Vec3 w = seen.sample(u);
+                const float cosine = dot(w, l.n);
+                const float t = cosine == 0 ? 0 : dot(l.p - from, l.n) / cosine;
+                if (!(t > 0)) return {};
+                const Vec3 point = from + t * w, d = point - l.p, c = cross(l.u, l.v);
+                const float s = dot(cross(d, l.v), c) / dot(c, c), q = dot(cross(l.u, d), c) / dot(c, c);
+                return towards(l, from, point, l.n, emitted(l, textures, s, q), 1 / seen.solid_angle);
+            }
+            // Uniform in the triangle (Heitz 2019, "A Low-Distortion Map Between Triangle and Square").
+            float s, t;
+            if (u.y > u.x)
+                s = u.x / 2, t = u.y - s;
+            else
+                t = u.y / 2, s = u.x - t;
+            return towards(l, from, l.p + s * l.u + t * l.v, l.n, emitted(l, textures, s, t));
+        }
+        case Kind::disk: {
+            if (!l.two_sided && dot(from - l.p, l.n) <= 0) return {};
+            const Vec2 d = square_to_disk(u);
+            return towards(l, from, l.p + d.x * l.u + d.y * l.v, l.n, l.radiance.constant);
+        }
+        case Kind::sphere: return sample_sphere(l, from, u);
+        case Kind::point:
+        case Kind::spot: {
+            const Vec3 d = l.p - from;
+            const float d2 = length_squared(d);
+            if (!(d2 > 0)) return {};
+            const float distance = std::sqrt(d2);
+            const Vec3 w = d / distance;
+            const float part = l.kind == Kind::spot ? spot_falloff(l, -dot(w, l.n)) : 1;
+            if (part == 0) return {};
+            return {w, distance, l.p, {}, part / d2 * l.light, 1};
+        }
+        case Kind::directional: return {-l.n, std::numeric_limits<float>::infinity(), {}, {}, l.light, 1};
+    }
+    return {};
+}
+
+float light_pdf(const Light& l, const Vec3& from, const Vec3& direction, float distance, const Vec3& normal) {
+    if (l.kind == Kind::rectangle && is_near(l, from)) return 1 / SphericalRectangle(l, from).solid_angle;
+    if (l.kind == Kind::triangle && is_near(l, from)) return 1 / SphericalTriangle(l, from).solid_angle;
+    if (l.kind == Kind::sphere) {
+        const float d2 = length_squared(l.p - from);
+        if (d2 > squared(l.radius) * 1.000001f) return 1 / (2 * pi * one_minus_cosine(l, d2));
+    }
+    return distance * distance / (std::fabs(dot(direction, normal)) * l.area);
+}
+
+bool is_sampled_evenly(const Light& l, const Vec3& from) {
+    switch (l.kind) {
+        case Kind::rectangle:
+        case Kind::triangle: return true;
+        case Kind::sphere: return length_squared(l.p - from) > squared(l.radius) * 1.000001f;
+        // Sampled by area, whose density per solid angle rises slowly as long as the disk is no nearer than wide.
+        default: return l.area < length_squared(l.p - from);
+    }
+}
+
+float importance(const Light& l, const Vec3& from) {
+    constexpr float least = 1e-30f;
+    switch (l.kind) {
+        case Kind::directional: return mean(l.light) + least;
+        case Kind::point:
+        case Kind::spot: return mean(l.light) / std::max(length_squared(l.p - from), least) + least;
+        case Kind::sphere: {
+            const float d2 = std::max(length_squared(l.p - from), squared(l.radius));
+            return mean(l.light) * pi * squared(l.radius) / d2 + least;
+        }
+        default: {
+            const Vec3 center = l.kind == Kind::disk ? l.p : l.p + (l.kind == Kind::triangle ? 1.0f / 3 : 0.5f) * (l.u + l.v);
+            // Never more than the whole hemisphere; behind a one-sided light there is none.
+            if (!l.two_sided && dot(from - l.p, l.n) <= 0) return least;
+            return mean(l.light) * std::min(l.area / std::max(length_squared(center - from), least), pi) + least;
+        }
+    }
+}
+
+}  // namespace oracle

@@ -1,0 +1,51 @@
+// Emitters of finite extent or power: how much light they send to a point, and how to choose a point on them.
+#pragma once
+
+#include "texture.h"
+#include "vec.h"
+
+namespace oracle {
+
+struct Light {
+    enum class Kind { triangle, rectangle, disk, sphere, point, spot, directional };
+    Kind kind;
+
+    Vec3 p{};          // a corner, the center or the position
+    Vec3 u{}, v{};     // edges from the corner; for a disk its radii
+    Vec3 n{};          // unit normal of the front, or where a spot or parallel light shines
+    float radius = 0;  // of a disk or sphere
+    float area = 0;
+    float full = 0, cutoff = 0;  // half angles of a spot
+    Color light{};     // radiance, intensity or irradiance; the mean of a textured radiance
+    ColorMap radiance; // of an area light
+    Vec2 uv[3] = {};   // texture coordinates of the three corners p, p + u, p + v
+    bool two_sided = false;
+
+    bool is_delta() const { return kind >= Kind::point; }
+};
+
+struct LightSample {
+    Vec3 direction;  // from the receiver, a unit vector
+    float distance;  // infinity for parallel light
+    Vec3 point;      // on the light, if it has a surface
+    Vec3 normal;     // there, towards the receiver; zero if there is no surface
+    Color light;     // radiance; for lights without extent the irradiance of a surface that faces them
+    float pdf = 0;   // per solid angle, 1 without extent, 0 if there is no light
+};
+
+// A point on the light as seen from `from`. Rectangles and triangles that look large, and spheres, are sampled by solid
+// angle, others by area.
+LightSample sample_light(const Light& light, const std::vector<Texture>& textures, const Vec3& from, const Vec2& u);
+
+// The density of the same choice, for a ray from `from` that met the light at `distance` along `direction`, where the
+// light's unit normal is `normal`.
+float light_pdf(const Light& light, const Vec3& from, const Vec3& direction, float distance, const Vec3& normal);
+
+// Whether `sample_light` spreads its samples about evenly over the light as it looks from `from`: what a diffuse surface
+// then makes of them is bounded.
+bool is_sampled_evenly(const Light& light, const Vec3& from);
+
+// About the irradiance that the light gives to a surface at `from` that faces it, with nothing in between; positive.
+float importance(const Light& light, const Vec3& from);
+
+}  // namespace oracle

@@ -1,0 +1,131 @@
+// A scene that is ready to be rendered: geometry in Embree, materials, lights. Frozen once committed.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "embree_compat.h"
+#include "environment.h"
+#include "light.h"
+#include "material.h"
+
+namespace oracle {
+
+struct Triangle {
+    uint32_t a, b, c;
+};
+
+using Affine = std::array<float, 12>;  // row by row, 3 x 4
+
+struct Mesh {
+    std::vector<Vec3> vertices, normals;  // normals may be empty
+    std::vector<Vec2> uv;                 // may be empty
+    std::vector<Triangle> triangles;
+};
+
+// What all surfaces of one geometry share.
+struct Object {
+    int material = -1;
+    int first_light = -1;  // the light of its first triangle, or its only one
+    bool emits = false, two_sided = false;
+    ColorMap radiance;
+};
+
+struct Ray {
+    Vec3 origin, direction;  // a unit vector
+};
+
+// Where a ray met a surface.
+struct Surface {
+    Vec3 p;
+    Vec3 normal;   // geometric, of the front
+    Vec3 shading;  // interpolated, of the front
+    Vec2 uv;
+    float distance;
+    uint32_t object, primitive;
+    int material;  // -1 is black
+};
+
+class Scene {
+public:
+    Scene();
+
+    int add_texture(Texture texture);
+    int add_material(const Material& material);
+    int add_object(const Object& object);  // the index for one of the following, which takes it
+    void add_mesh(int object, Mesh mesh);
+    void add_rectangle(int object, const Vec3& corner, const Vec3& u, const Vec3& v);
+    void add_disk(int object, const Vec3& center, const Vec3& normal, float radius);
+    void add_sphere(int object, const Vec3& center, float radius);
+    void add_instances(int object, Mesh mesh, const std::vector<Affine>& transforms);
+    void add_light(const Light& light);
+    void set_environment(Environment environment);
+    void set_medium(const Color& absorption, const Color& scattering, float asymmetry);
+    void commit();
+
+    // The nearest surface beyond the ray's origin; false if there is none.
+    bool intersect(const Ray& ray, Surface& surface) const;
+    // Whether anything is between two points that were moved off their surfaces.
+    bool blocked(const Vec3& from, const Vec3& direction, float distance) const;
+
+    Bsdf bsdf(const Surface& surface, int material) const {
+        return {materials, textures, materials[size_t(material)], surface.uv};
+    }
+    Color emitted(const Surface& surface, const Vec3& towards) const;
+
+    // A light in proportion to its importance at `from`, the probability of that, and the same for a given light. `u` in
+    // [0, 1) becomes uniform anew.
+    int select_light(const Vec3& from, float& u, float& probability) const;
+    float light_probability(const Vec3& from, int light) const;
+    // Whether a diffuse surface at `from` had better leave the light to being sampled: it would only gain noise.
+    bool leave_to_sampling(const Light& light, const Vec3& from) const;
+
+    std::vector<Texture> textures;
+    std::vector<Material> materials;
+    std::vector<Object> objects;
+    std::vector<Light> lights;
+    Environment environment;
+    Color absorption{}, scattering{};
+    float asymmetry = 0;
+    bool has_medium = false, scatters = false;
+    bool samples_environment = false;  // whether the environment is one of the lights to be selected, the last one
+
+    RTCScene embree() const { return scene_.get(); }
+
+private:
+    enum class Kind { mesh, rectangle, disk, sphere, instance };
+    // What is known of each of Embree's geometries, by their number.
+    struct Geometry {
+        Kind kind;
+        uint32_t object;
+        int mesh = -1;  // whose normals and texture coordinates to look up
+        Vec3 center{}, u{}, v{}, normal{};
+        float radius = 0;
+        Affine transform{};
+    };
+    friend struct UserGeometry;
+
+    void attach(RTCGeometry geometry, const Geometry& description);
+    Owned<RTCGeometry> make_mesh(const Mesh& mesh) const;
+    void add_area_lights(int object, const Geometry& geometry, const Mesh* mesh);
+    void check(const char* what) const;
+
+    Owned<RTCDevice> device_;  // before the scene: members die in reverse order
+    Owned<RTCScene> scene_;
+    std::vector<Owned<RTCScene>> prototypes_;
+    std::vector<Geometry> geometries_;
+    std::vector<std::unique_ptr<Mesh>> meshes_;
+    std::vector<float> light_cdf_;  // by power, where there are too many to look at each
+    float environment_importance_ = 0;
+};
+
+// Off a surface, to the side where `direction` points, by more than rounding can have moved the point.
+inline Vec3 off_surface(const Vec3& p, const Vec3& normal, const Vec3& direction, float distance) {
+    const float step = 5e-7f * std::max(largest(p), std::min(distance, 1e18f));
+    return p + (dot(normal, direction) < 0 ? -step : step) * normal;
+}
+
+}  // namespace oracle
