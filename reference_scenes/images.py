@@ -48,21 +48,31 @@ def read_texels(folder: Path, name: str) -> Floats:
                 raise InvalidImage(f"is no {suffix[1:].upper()} file, whatever its name says")
     except OSError as error:
         raise InvalidImage(f"cannot be read: {error.strerror}") from None
+    texels = _decoded(path)
+    if isinstance(texels, str):
+        raise InvalidImage(texels)
+    return _linear(texels) if suffix == ".png" else texels
+
+
+def _decoded(path: Path) -> Floats | str:
+    """The values in a file, shape (H, W, 3), or what is wrong with it.
+
+    No exception is raised here, as it would keep objects of the library alive beyond the library itself.
+    """
     image = oiio.ImageInput.open(str(path))
     if image is None:
-        raise InvalidImage("is broken: " + " ".join(oiio.geterror().split()))
+        return "is broken: " + " ".join(oiio.geterror().split())
     spec = image.spec()
     if spec.width * spec.height > MOST_TEXELS:
-        raise InvalidImage(f"has {spec.width} x {spec.height} texels; {MOST_TEXELS} are the most")
+        return f"has {spec.width} x {spec.height} texels; {MOST_TEXELS} are the most"
     if spec.nchannels not in (1, 3):
-        raise InvalidImage(f"has {spec.nchannels} channels; save it with three, or with one for grey")
-    texels = image.read_image(oiio.FLOAT)
-    if texels is None:
-        raise InvalidImage("is broken: " + " ".join(image.geterror().split()))
-    texels = np.broadcast_to(texels.astype(np.float64), (spec.height, spec.width, 3))
-    if not np.isfinite(texels).all():
-        raise InvalidImage("holds NaN or infinite values")
-    return _linear(texels) if suffix == ".png" else texels
+        return f"has {spec.nchannels} channels; save it with three, or with one for grey"
+    values = image.read_image(oiio.FLOAT)
+    if values is None:
+        return "is broken: " + " ".join(image.geterror().split())
+    if not np.isfinite(values).all():
+        return "holds NaN or infinite values"
+    return np.broadcast_to(values.astype(np.float64), (spec.height, spec.width, 3))
 
 
 def write_exr(path: Path, texels: Floats) -> None:

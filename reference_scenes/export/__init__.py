@@ -8,6 +8,9 @@ from pathlib import Path
 
 from reference_scenes import model
 from reference_scenes.export import mitsuba3, native
+from reference_scenes.export.errors import CannotExport
+
+__all__ = ["FORMATS", "CannotExport", "Format", "export"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,13 @@ FORMATS: dict[str, Format] = {
 
 
 def export(scene: model.Scene, format_name: str, directory: Path) -> Path:
-    """Write a scene into `directory` (made if needed) under a neutral name; return its main file."""
+    """Write a scene into `directory` (made if needed) under a neutral name; return its main file.
+
+    Raises
+    ------
+    CannotExport
+        If the format cannot say the scene; the message names the field.
+    """
     chosen = FORMATS[format_name]
     directory.mkdir(parents=True, exist_ok=True)
     chosen.write(scene, directory / chosen.filename)

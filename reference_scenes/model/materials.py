@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
-from reference_scenes.model.base import ABSENT, Model, Positive, Spectrum, requires_type, type_or
+from reference_scenes.model.base import ABSENT, Flag, Model, Positive, Spectrum, requires_type, type_or
 from reference_scenes.model.textures import Bitmap, Checker, Reflectance
 
 
@@ -48,12 +48,16 @@ Alpha = Annotated[float, Field(strict=True, ge=1e-4, le=1)]
 
 
 class RoughConductor(_Material):
-    """A metal of GGX facets that scatter once, with heights correlated; ``alpha`` is their root mean square slope."""
+    """A metal of GGX facets that scatter once; ``alpha`` is the width of the distribution of slopes [Walter 2007].
+
+    Smith's masking and shadowing are correlated by height [Heitz 2014], or multiplied if ``separable``.
+    """
 
     type: Literal["rough_conductor"] = "rough_conductor"
     eta: Spectrum
     k: Spectrum
     alpha: Alpha
+    separable: Flag = False
 
 
 def _require_bending(value: float) -> float:
@@ -63,11 +67,12 @@ def _require_bending(value: float) -> float:
 
 
 class RoughDielectric(_Material):
-    """An interface of GGX facets that scatter once; ``eta`` as for a dielectric, ``alpha`` as for a rough conductor."""
+    """An interface of GGX facets that scatter once; ``eta`` as for a dielectric, the rest as for a rough conductor."""
 
     type: Literal["rough_dielectric"] = "rough_dielectric"
     eta: Annotated[Positive, AfterValidator(_require_bending)]
     alpha: Alpha
+    separable: Flag = False
 
 
 class Phong(_Material):
