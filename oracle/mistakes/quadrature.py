@@ -6,12 +6,13 @@ and shows its shining side. With a = b = 1, k = 2 that is the irradiance of unit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
+from oracle.adaptive import integrate
 from oracle.arrays import Booleans, Floats, Integers, InvalidArgument, dot
 from oracle.bounded import Bounded
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
@@ -20,13 +21,10 @@ _EPSILON = float(np.finfo(np.float64).eps)
 
 # A patch is done when its two quadratures differ by less than this part of the receiver's integral.
 _TOLERANCE = 1e-9
-_DEEPEST = 40
-# So many patches are evaluated at once, each in 100 places.
-_AT_ONCE = 4096
 
-# Takes indices of patches (K,) and places s, t (K, Q) in their unit square. Returns offsets from the receiver to the
-# light (K, Q, 3), cosine at the light (K, Q), and area per unit square (K, Q), all of one sign.
-Places: TypeAlias = Callable[[Integers, Floats, Floats], tuple[Floats, Floats, Floats]]
+# Takes indices of patches (K,) and places s, t (K, Q) in their unit square, or s along a line. Returns offsets from the
+# receiver to the light (K, Q, 3), cosine at the light (K, Q), and area per unit square (K, Q), all of one sign.
+Places: TypeAlias = Callable[..., tuple[Floats, Floats, Floats]]
 
 
 @dataclass(frozen=True)
@@ -82,13 +80,13 @@ def over_line(kernel: Kernel, start: Floats, end: Floats, points: Floats, normal
     along = end - start
     length = float(np.linalg.norm(along))
 
-    def places(k: Integers, s: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
+    def places(k: Integers, s: Floats) -> tuple[Floats, Floats, Floats]:
         part = (last - first)[owner[k], None]
         offset = a[owner[k], None] + (first[owner[k], None] + part * s)[..., None] * along
         sine = np.linalg.norm(np.cross(offset, along), axis=-1) / (np.linalg.norm(offset, axis=-1) * length)
-        return offset, sine, length * part * np.ones_like(t)
+        return offset, sine, length * part * np.ones_like(s)
 
-    return _integrate(kernel, Patches(owner, np.ones(len(owner)), places), normals)
+    return _integrate(kernel, Patches(owner, np.ones(len(owner)), places), normals, dimensions=1)
 
 
 def refuse_on_light(points: Floats, there: Booleans) -> None:
@@ -231,69 +229,17 @@ def _sphere(shape: Sphere, two_sided: bool, points: Floats, normals: Floats) -> 
     return Patches(owner, np.ones(len(owner)), places)
 
 
-def _integrate(kernel: Kernel, patches: Patches, normals: Floats) -> Bounded:
-    """Sum of the integrals over all patches of each receiver, quartering patches until two quadratures agree."""
-    count = len(normals)
-    value, error = np.zeros(count), np.zeros(count)
-    index = np.arange(len(patches.owner))
-    corner, size = np.zeros((len(index), 2)), 1.0
-    for depth in range(_DEEPEST + 1):
-        if not len(index):
-            break
-        coarse, fine, noise = _evaluate(kernel, patches, normals, index, corner, size)
-        owner = patches.owner[index]
-        difference = np.abs(fine - coarse)
-        # The parts of a non-convex polygon may cancel: what counts is how much there is of either sign.
-        total = np.bincount(owner, np.abs(fine), count) + np.abs(value)
-        done = (difference <= _TOLERANCE * total[owner] + noise) | (depth == _DEEPEST)
-        value += np.bincount(owner[done], (patches.sign[index] * fine)[done], count)
-        error += np.bincount(owner[done], (difference + noise)[done], count)
-        index = np.repeat(index[~done], 4)
-        size /= 2
-        quarters = size * np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
-        corner = (corner[~done, None] + quarters).reshape(-1, 2)
-    return Bounded(value, error)
+def _integrate(kernel: Kernel, patches: Patches, normals: Floats, dimensions: int = 2) -> Bounded:
+    """Sum of the integrals over all patches of each receiver."""
 
+    def integrand(index: Integers, *coordinates: Floats) -> tuple[Floats, Floats]:
+        offset, light, area = patches.places(index, *coordinates)
+        distance = np.linalg.norm(offset, axis=-1)
+        cosine = np.clip(dot(offset, normals[patches.owner[index]][:, None]) / distance, 0, 1)
+        scale = area / distance**kernel.distance
+        # Rounding moves a point by parts of the patch's extent, which matters in proportion to the distance.
+        extent = distance.max(axis=-1, keepdims=True)
+        noise = 16 * _EPSILON * scale * extent / distance
+        return patches.sign[index, None] * scale * cosine**kernel.receiver * light**kernel.light, noise
 
-def _evaluate(
-    kernel: Kernel, patches: Patches, normals: Floats, index: Integers, corner: Floats, size: float
-) -> tuple[Floats, Floats, Floats]:
-    """Integrals (K,) over parts of patches by 6 x 6 and 10 x 10 Gauss points, and the rounding error of the latter."""
-    results = []
-    for order in (6, 10):
-        nodes, weights = np.polynomial.legendre.leggauss(order)
-        s, t = (grid.ravel() for grid in np.meshgrid((nodes + 1) / 2, (nodes + 1) / 2))
-        weight = np.outer(weights, weights).ravel() / 4 * size**2
-        sums = [
-            _sums(kernel, patches, normals, index[part], corner[part], size, s, t, weight)
-            for part in _slices(len(index))
-        ]
-        results.append(np.concatenate(sums, axis=1))
-    return results[0][0], results[1][0], results[1][1]
-
-
-def _sums(
-    kernel: Kernel,
-    patches: Patches,
-    normals: Floats,
-    index: Integers,
-    corner: Floats,
-    size: float,
-    s: Floats,
-    t: Floats,
-    weight: Floats,
-) -> Floats:
-    offset, light, area = patches.places(index, corner[:, :1] + size * s, corner[:, 1:] + size * t)
-    distance = np.linalg.norm(offset, axis=-1)
-    cosine = np.clip(dot(offset, normals[patches.owner[index]][:, None]) / distance, 0, 1)
-    scale = weight * area / distance**kernel.distance
-    integral = (scale * cosine**kernel.receiver * light**kernel.light).sum(axis=-1)
-    # Rounding moves a point by parts of the patch's extent, which matters in proportion to the distance.
-    extent = distance.max(axis=-1, keepdims=True)
-    noise = 16 * _EPSILON * (np.abs(scale) * extent / distance).sum(axis=-1)
-    return np.stack([integral, noise])
-
-
-def _slices(count: int) -> Iterator[slice]:
-    for start in range(0, count, _AT_ONCE):
-        yield slice(start, start + _AT_ONCE)
+    return integrate(integrand, patches.owner, len(normals), _TOLERANCE, dimensions)
