@@ -359,6 +359,15 @@ CEILING = model.Object(shape=rectangle((0.0, 0.0, 5.0), (9.0, 0.0, 0.0), (0.0, -
 WALL = model.Object(shape=rectangle((9.0, 0.0, 1.0), (0.0, 9.0, 0.0), (0.0, 0.0, 0.5)), material=GREY)
 
 
+PARALLEL = model.OrthographicCamera(origin=ABOVE.origin, target=ABOVE.target, up=ABOVE.up, width=2.0)
+CHECKER = model.Checker(even=ONE, odd=(0.0, 0.0, 0.0))
+UP = ((0.0, 0.0, 1.0),) * 3
+ONE_TRIANGLE = model.Mesh(vertices=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), triangles=((0, 1, 2),))
+BENT = model.Object(shape=ONE_TRIANGLE.model_copy(update={"normals": UP}), material=GREY)
+AS_IT_IS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+COPIES = model.Object(shape=model.Instances(mesh=ONE_TRIANGLE, transforms=(AS_IT_IS,)), material=BLACK)
+
+
 @pytest.mark.parametrize(
     ("refused", "message"),
     [
@@ -392,6 +401,40 @@ WALL = model.Object(shape=rectangle((9.0, 0.0, 1.0), (0.0, 9.0, 0.0), (0.0, 0.0,
             "/objects/1/shape may hide /emitters/0 from /objects/0",
         ),
         (scene(floor(), lamp(), SKY), "/emitters/0/shape may hide /emitters/1 from /objects/0"),
+        # Other than diffuse surfaces, uniform light and a pinhole.
+        (
+            scene(floor(model.Plastic(reflectance=ONE, eta=1.5)), POINT),
+            "/objects/0/material is plastic; closed forms of images need diffuse",
+        ),
+        (
+            scene(floor(model.Diffuse(reflectance=CHECKER)), POINT),
+            "/objects/0/material/reflectance is a texture; closed forms of images need one colour",
+        ),
+        (
+            scene(floor(), COPIES, POINT),
+            "/objects/1/shape holds instances, which may hide each other or light each other",
+        ),
+        (scene(BENT, POINT), "/objects/0/shape/normals bend it; closed forms need the surface as it is"),
+        (
+            scene(floor(), lamp(radiance=CHECKER)),
+            "/emitters/0/radiance is a texture; closed forms of images need one colour",
+        ),
+        (
+            scene(floor(), lamp().model_copy(update={"two_sided": True})),
+            "/emitters/0/two_sided is true; closed forms of images need light from the front alone",
+        ),
+        (
+            scene(floor(), model.SkyEmitter(zenith=RGB)),
+            "/emitters/0 is sky; closed forms of images need a constant environment",
+        ),
+        (
+            scene(floor(), POINT, camera=PARALLEL),
+            "/camera is orthographic; closed forms of images need a perspective camera",
+        ),
+        (
+            scene(floor(), POINT).model_copy(update={"medium": model.Medium(absorption=ONE, scattering=ONE)}),
+            "/medium scatters or absorbs; closed forms of images need empty space",
+        ),
         # A sphere has no side behind which an occluder would be harmless.
         (
             scene(floor(), ball((0.0, 0.0, 3.0)),
