@@ -20,25 +20,59 @@ struct Release {
 template <typename Handle>
 using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
-inline void closest_hit(RTCScene scene, RTCRayHit& ray) {
 #if ORACLE_EMBREE_MAJOR >= 4
-    rtcIntersect1(scene, &ray);
+
+inline void closest_hit(RTCScene scene, RTCRayHit& ray) { rtcIntersect1(scene, &ray); }
+
+// Leaves -infinity in ray.tfar when something is hit.
+inline void any_hit(RTCScene scene, RTCRay& ray) { rtcOccluded1(scene, &ray); }
+
+// The same for eight rays that run side by side; `valid` holds -1 for those that count and 0 for others.
+inline void closest_hit8(RTCScene scene, const int* valid, RTCRayHit8& rays) {
+    RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    rtcIntersect8(valid, scene, &rays, &arguments);
+}
+
+inline void any_hit8(RTCScene scene, const int* valid, RTCRay8& rays) {
+    RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    rtcOccluded8(valid, scene, &rays, &arguments);
+}
+
 #else
+
+inline RTCIntersectContext make_context(RTCIntersectContextFlags flags) {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    context.flags = flags;
+    return context;
+}
+
+inline void closest_hit(RTCScene scene, RTCRayHit& ray) {
+    RTCIntersectContext context = make_context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
     rtcIntersect1(scene, &context, &ray);
-#endif
 }
 
 // Leaves -infinity in ray.tfar when something is hit.
 inline void any_hit(RTCScene scene, RTCRay& ray) {
-#if ORACLE_EMBREE_MAJOR >= 4
-    rtcOccluded1(scene, &ray);
-#else
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    RTCIntersectContext context = make_context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
     rtcOccluded1(scene, &context, &ray);
-#endif
 }
+
+// The same for eight rays that run side by side; `valid` holds -1 for those that count and 0 for others.
+inline void closest_hit8(RTCScene scene, const int* valid, RTCRayHit8& rays) {
+    RTCIntersectContext context = make_context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+    rtcIntersect8(valid, scene, &context, &rays);
+}
+
+inline void any_hit8(RTCScene scene, const int* valid, RTCRay8& rays) {
+    RTCIntersectContext context = make_context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+    rtcOccluded8(valid, scene, &context, &rays);
+}
+
+#endif
 
 }  // namespace oracle

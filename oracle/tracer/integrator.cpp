@@ -58,26 +58,26 @@ struct Vertex {
     }
 
     // The direction is in world space.
-    BsdfSample sample(const Scene& scene, Strategy strategy, Sampler& sampler) const {
+    BsdfSample sample(const Scene& scene, Strategy strategy, const Vec2& u, float choice) const {
         BsdfSample s;
         if (kind == Kind::medium) {
-            s.to_light = sample_phase(scene.asymmetry, -frame.z, sampler.next_2d());
+            s.to_light = sample_phase(scene.asymmetry, -frame.z, u);
             s.weight = white();
             s.pdf = phase_function(scene.asymmetry, -dot(frame.z, s.to_light));
             return s;
         }
         if (kind == Kind::meter) {
-            s.to_light = square_to_cosine_hemisphere(sampler.next_2d());
+            s.to_light = square_to_cosine_hemisphere(u);
             s.weight = pi * white();
             s.pdf = s.to_light.z * inv_pi;
         } else if (strategy == Strategy::hemisphere && !bsdf.has_delta()) {
             // Both hemispheres where light can come through.
             const bool through = bsdf.transmits();
-            s.to_light = through ? square_to_sphere(sampler.next_2d()) : square_to_hemisphere(sampler.next_2d());
+            s.to_light = through ? square_to_sphere(u) : square_to_hemisphere(u);
             s.pdf = through ? inv_pi / 4 : inv_pi / 2;
             s.weight = bsdf.evaluate(to_eye, s.to_light) / s.pdf;
         } else {
-            s = bsdf.sample(to_eye, sampler);
+            s = bsdf.sample(to_eye, u, choice);
         }
         s.to_light = frame.to_world(s.to_light);
         return s;
@@ -92,26 +92,25 @@ struct Vertex {
     }
 };
 
-// Light that one emitter, chosen at random, sends to the vertex and on along the path.
-Color sample_direct(const Scene& scene, const Vertex& vertex, Strategy strategy, Sampler& sampler) {
-    Vec2 u = sampler.next_2d();
-    float probability;
-    const bool sky = scene.environment.kind != Environment::Kind::none && !scene.samples_environment &&
-                     strategy == Strategy::light;
-    int chosen = scene.select_light(vertex.p, u.x, probability);
+// Light that one emitter, chosen at random, sends to the vertex and on along the path, unless something is in between.
+Connection sample_direct(const Scene& scene, const Vertex& vertex, Strategy strategy, Vec2 u) {
+    float probability = 1;
+    const int chosen = scene.select_light(vertex.p, u.x, probability);
     bool environment = scene.samples_environment && chosen == int(scene.lights.size());
-    if (sky) {
-        // Without BSDF sampling a smooth environment has to be looked for as well: in half of the samples.
-        const bool both = chosen >= 0;
-        if (both) u.y = u.y < 0.5f ? 2 * u.y : (environment = true, 2 * u.y - 1);
-        if (!both) environment = true, probability = 1;
-        if (both && environment) probability = 0.5f;
-        if (both && !environment) probability *= 0.5f;
+    if (strategy == Strategy::light && scene.has_smooth_environment()) {
+        // Without BSDF sampling it has to be looked for here: in half of the samples, if there is anything else.
+        if (chosen < 0) {
+            environment = true;
+        } else {
+            environment = u.y < 0.5f;
+            u.y = environment ? 2 * u.y : 2 * u.y - 1;
+            probability = environment ? 0.5f : 0.5f * probability;
+        }
     }
     if (chosen < 0 && !environment) return {};
 
     LightSample s{};
-    bool delta = false;
+    bool alone = false;  // whether nothing else finds this light
     if (environment) {
         s.direction = scene.environment.sample(u, s.pdf);
         s.light = scene.environment.radiance(s.direction);
@@ -119,57 +118,55 @@ Color sample_direct(const Scene& scene, const Vertex& vertex, Strategy strategy,
     } else {
         const Light& light = scene.lights[size_t(chosen)];
         s = sample_light(light, scene.textures, vertex.p, u);
-        delta = light.is_delta();
+        alone = light.is_delta() || (vertex.is_diffuse() && scene.leave_to_sampling(light, vertex.p));
     }
     if (!(s.pdf > 0) || is_black(s.light)) return {};
     const Color f = vertex.evaluate(scene, s.direction);
     if (is_black(f)) return {};
 
-    // From beside the one surface to beside the other.
-    const Vec3 from = vertex.leave(s.direction);
-    Vec3 direction = s.direction;
-    float distance = s.distance;
-    if (std::isfinite(distance)) {
-        const bool has_surface = !delta;
-        const Vec3 target = has_surface ? off_surface(s.point, s.normal, s.normal, s.distance) : s.point;
-        const Vec3 d = target - from;
-        distance = length(d);
-        direction = d / distance;
-        distance *= 1 - 2e-7f;
-    }
-    if (scene.blocked(from, direction, distance)) return {};
-
     const float pdf = s.pdf * probability;
-    float weight = 1;
-    const bool alone = delta || (!environment && vertex.is_diffuse() &&
-                                 scene.leave_to_sampling(scene.lights[size_t(chosen)], vertex.p));
-    if (strategy == Strategy::mis && !alone) weight = balance(pdf, vertex.pdf(scene, s.direction));
-    Color result = weight / pdf * f * s.light;
-    if (scene.has_medium) result *= transmittance(scene, s.distance);
+    const float weight = strategy == Strategy::mis && !alone ? balance(pdf, vertex.pdf(scene, s.direction)) : 1;
+    Connection result{vertex.leave(s.direction), s.direction, s.distance, weight / pdf * f * s.light};
+    if (scene.has_medium) result.light *= transmittance(scene, s.distance);
+    // From beside the one surface to beside the other.
+    if (std::isfinite(s.distance)) {
+        const Vec3 d = off_surface(s.point, s.normal, s.normal, s.distance) - result.from;
+        const float distance = length(d);
+        result.direction = d / distance;
+        result.distance = distance * (1 - 2e-7f);
+    }
     return result;
 }
 
-// The light's weight if a ray that was sampled with density `pdf` finds it: the other way would be to sample it.
-float weight_of_hit(const Scene& scene, Strategy strategy, const Vec3& from, bool from_diffuse, const Ray& ray,
-                    const Surface& s, float pdf) {
+// The light's weight if a ray finds it; the other way would have been to sample it.
+float weight_of_hit(const Scene& scene, Strategy strategy, const Path& path, const Surface& s) {
+    if (path.delta) return 1;
     if (strategy != Strategy::mis) return strategy == Strategy::light ? 0 : 1;
     const Object& object = scene.objects[s.object];
     const int index = object.first_light + int(s.primitive);
     const Light& light = scene.lights[size_t(index)];
-    if (from_diffuse && scene.leave_to_sampling(light, from)) return 0;
-    const float other = light_pdf(light, from, ray.direction, s.distance, s.normal) * scene.light_probability(from, index);
-    return balance(pdf, other);
+    if (path.diffuse && scene.leave_to_sampling(light, path.from)) return 0;
+    const float other = light_pdf(light, path.from, path.ray.direction, s.distance, s.normal) *
+                        scene.light_probability(path.from, index);
+    return balance(path.pdf, other);
+}
+
+float weight_of_environment(const Scene& scene, Strategy strategy, const Path& path) {
+    if (path.delta) return 1;
+    if (strategy == Strategy::light) return 0;
+    if (strategy != Strategy::mis || !scene.samples_environment) return 1;
+    const float chosen = scene.light_probability(path.from, int(scene.lights.size()));
+    return balance(path.pdf, scene.environment.pdf(path.ray.direction) * chosen);
 }
 
 // Distance at which the ray is scattered, and its throughput up to there or to the surface at `limit` that it reaches.
-bool sample_medium(const Scene& scene, float limit, Sampler& sampler, float& distance, Color& throughput) {
+bool sample_medium(const Scene& scene, float limit, const Vec2& u, float& distance, Color& throughput) {
     const Color extinction = scene.absorption + scene.scattering;
     if (!scene.scatters) {
         throughput = transmittance(scene, limit);
         return false;
     }
     // By the extinction of one channel, chosen at random; the density is the mean of all of them.
-    const Vec2 u = sampler.next_2d();
     const float chosen = u.x < 1.0f / 3 ? extinction.x : u.x < 2.0f / 3 ? extinction.y : extinction.z;
     distance = chosen > 0 ? -std::log(1 - u.y) / chosen : infinity;
     if (distance >= limit) {
@@ -180,6 +177,115 @@ bool sample_medium(const Scene& scene, float limit, Sampler& sampler, float& dis
     const Color t = transmittance(scene, distance);
     throughput = t * scene.scattering / mean(extinction * t);
     return true;
+}
+
+// The numbers of one step of a path.
+struct Draw {
+    Vec2 light, direction, medium;
+    float choice, roulette;
+};
+
+// The numbers of the same step of all paths of a batch: two blocks of the sampler, the second one only if it is needed.
+struct Draws {
+    Block first, second;
+
+    Draws(const Scene& scene, const Sampler& sampler, uint32_t step) {
+        sampler.draw(2 * step + 1, first);
+        if (scene.needs_choices || int(step) + 1 >= roulette_from)
+            sampler.draw(2 * step + 2, second);
+        else
+            second = {};
+    }
+
+    Draw of(int i) const {
+        return {{first.a[i], first.b[i]}, {first.c[i], first.d[i]}, {second.c[i], second.d[i]}, second.a[i], second.b[i]};
+    }
+};
+
+// The next step from a vertex: a connection to a light and the ray on; false if the path ends.
+bool scatter(const Scene& scene, const Method& method, Path& path, const Vertex& vertex, const Draw& draw,
+             Connection& connection) {
+    const bool samples_lights = method.strategy == Strategy::light || method.strategy == Strategy::mis;
+    const bool smooth = vertex.kind == Vertex::Kind::surface && vertex.bsdf.is_delta();
+    if (samples_lights && !smooth && path.bounce + 1 >= method.first_bounce) {
+        connection = sample_direct(scene, vertex, method.strategy, draw.light);
+        connection.light *= path.throughput;
+    }
+    path.diffuse = vertex.is_diffuse();
+    // The last ray would find nothing that was not sampled.
+    if (path.bounce + 1 == method.bounces && !smooth &&
+        (method.strategy == Strategy::light ||
+         (method.strategy == Strategy::mis && path.diffuse && scene.leaves_all_to_sampling(vertex.p))))
+        return false;
+
+    const BsdfSample next = vertex.sample(scene, method.strategy, draw.direction, draw.choice);
+    path.throughput *= next.weight;
+    if (is_black(path.throughput)) return false;
+    path.delta = next.delta, path.pdf = next.pdf, path.bent *= next.bent;
+    ++path.bounce;
+    if (path.bounce >= roulette_from) {
+        // What refraction did to the radiance on the way in it undoes on the way out, so that counts for nothing here.
+        float survives = std::min(max_component(path.throughput) * path.bent, 1.0f);
+        if (path.bounce >= roulette_for_all_from) survives = std::min(survives, 0.95f);
+        if (survives < 1) {
+            if (draw.roulette >= survives) return false;
+            path.throughput *= 1 / survives;
+        }
+    }
+    path.from = vertex.p;
+    path.ray = {vertex.leave(next.to_light), next.to_light};
+    return true;
+}
+
+// What the path finds where its ray leads: `s`, or nothing if not `hit`. False if it ends there.
+bool arrive(const Scene& scene, const Method& method, Path& path, bool hit, Surface& s, const Draw& draw,
+            Connection& connection) {
+    const Vec3 back = -path.ray.direction;
+    if (scene.has_medium) {
+        float distance;
+        Color passed;
+        const bool scattered = sample_medium(scene, hit ? s.distance : infinity, draw.medium, distance, passed);
+        path.throughput *= passed;
+        if (scattered) {
+            if (path.bounce >= method.bounces) return false;
+            const Vec3 p = path.ray.origin + distance * path.ray.direction;
+            const Vertex vertex{Vertex::Kind::medium, p, {}, distance, Frame(back), scene.bsdf(s, 0), {0, 0, 1}};
+            return scatter(scene, method, path, vertex, draw, connection);
+        }
+    }
+    const bool counts = path.bounce >= method.first_bounce;
+    if (!hit) {
+        if (counts && scene.environment.kind != Environment::Kind::none)
+            path.result += weight_of_environment(scene, method.strategy, path) * path.throughput *
+                           scene.environment.radiance(path.ray.direction);
+        return false;
+    }
+    if (counts && scene.objects[s.object].emits) {
+        const Color light = scene.emitted(s, back);
+        if (!is_black(light)) path.result += weight_of_hit(scene, method.strategy, path, s) * path.throughput * light;
+    }
+    if (s.material < 0 || path.bounce >= method.bounces) return false;
+
+    // The material of the side that the ray met, in a frame in which that side is up.
+    int material = s.material;
+    if (const Material& sides = scene.materials[size_t(material)]; sides.kind == Material::Kind::two_sided) {
+        const bool front = dot(s.shading, back) > 0;
+        material = front ? sides.first : sides.second;
+        if (!front) s.shading = -s.shading;
+    }
+    const Frame frame(s.shading);
+    const Vertex vertex{Vertex::Kind::surface, s.p, s.normal, s.distance, frame, scene.bsdf(s, material), frame.to_local(back)};
+    return scatter(scene, method, path, vertex, draw, connection);
+}
+
+// An irradiance meter is a first vertex, at which light is reflected once more than is counted.
+bool begin_at_meter(const Scene& scene, const Method& method, const Sensor& sensor, const Vec2& position, Path& path,
+                    const Draw& draw, Connection& connection) {
+    path.bounce = -1;
+    const Vec3 p = sensor.point(position);
+    const Surface nothing{};
+    const Vertex vertex{Vertex::Kind::meter, p, sensor.forward, 0, Frame(sensor.forward), scene.bsdf(nothing, 0), {}};
+    return scatter(scene, method, path, vertex, draw, connection);
 }
 
 }  // namespace
@@ -193,96 +299,54 @@ Ray sensor_ray(const Sensor& sensor, const Vec2& f) {
     }
 }
 
-Color measure(const Scene& scene, const Sensor& sensor, const Film& film, const Method& method, int x, int y,
-              Sampler& sampler) {
-    const Vec2 position = film_position(film, x, y, sampler.next_2d());
-    const Strategy strategy = method.strategy;
-    Color result{}, throughput = white();
-    const bool meter = sensor.kind == Sensor::Kind::irradiance_meter;
-    Ray ray = meter ? Ray{sensor.point(position), -sensor.forward} : sensor_ray(sensor, position);
-    Vec3 from = ray.origin;  // the vertex before
-    float pdf = 0;           // with which it chose the ray
-    bool delta = true;       // ... if it had a choice
-    bool diffuse = false;    // whether it scattered evenly
-    float bent = 1;
-    // An irradiance meter is a first vertex at which light is reflected once more than is counted.
-    int bounce = meter ? -1 : 0;
+void measure(const Scene& scene, const Sensor& sensor, const Film& film, const Method& method, int x, int y,
+             const Sampler& sampler, int count, Color* results) {
+    Path paths[batch];
+    Surface surfaces[batch];
+    Connection connections[batch] = {};
+    const bool at_meter = sensor.kind == Sensor::Kind::irradiance_meter;
+    // The paths that go on.
+    int alive[batch], living = 0;
+    bool blocked[batch];
 
-    for (bool at_meter = meter;; at_meter = false) {
-        Surface s{};
-        Vertex::Kind kind = Vertex::Kind::meter;
-        float distance = 0;
-        if (at_meter) {
-            s.p = from, s.normal = s.shading = sensor.forward, s.material = -1;
-        } else {
-            kind = Vertex::Kind::surface;
-            const bool hit = scene.intersect(ray, s);
-            if (scene.has_medium) {
-                Color passed;
-                if (sample_medium(scene, hit ? s.distance : infinity, sampler, distance, passed)) kind = Vertex::Kind::medium;
-                throughput *= passed;
-            }
-            if (kind == Vertex::Kind::medium) {
-                s.p = ray.origin + distance * ray.direction;
-                s.material = -1;
-            } else {
-                distance = s.distance;
-                if (!hit) {
-                    if (scene.environment.kind == Environment::Kind::none || bounce < method.first_bounce) return result;
-                    float weight = 1;
-                    if (!delta && strategy == Strategy::light) weight = 0;
-                    if (!delta && strategy == Strategy::mis && scene.samples_environment)
-                        weight = balance(pdf, scene.environment.pdf(ray.direction) *
-                                                  scene.light_probability(from, int(scene.lights.size())));
-                    return result + weight * throughput * scene.environment.radiance(ray.direction);
-                }
-                if (scene.objects[s.object].emits && bounce >= method.first_bounce) {
-                    const Color light = scene.emitted(s, -ray.direction);
-                    if (!is_black(light)) {
-                        const float weight = delta ? 1 : weight_of_hit(scene, strategy, from, diffuse, ray, s, pdf);
-                        result += weight * throughput * light;
-                    }
-                }
-                if (s.material < 0) return result;
-            }
-            if (bounce >= method.bounces) return result;
+    Block film_block;
+    sampler.draw(0, film_block);
+    uint32_t step = 0;
+    if (at_meter) {
+        const Draws draws(scene, sampler, step++);
+        for (int i = 0; i < count; ++i) {
+            const Vec2 position = film_position(film, x, y, {film_block.a[i], film_block.b[i]});
+            if (begin_at_meter(scene, method, sensor, position, paths[i], draws.of(i), connections[i])) alive[living++] = i;
         }
-        if (is_black(throughput)) return result;
-
-        // The material of the side that the ray met, in a frame in which that side is up.
-        const Vec3 back = -ray.direction;
-        int material = std::max(s.material, 0);
-        if (kind == Vertex::Kind::surface && scene.materials[size_t(material)].kind == Material::Kind::two_sided) {
-            const Material& sides = scene.materials[size_t(material)];
-            const bool front = dot(s.shading, back) > 0;
-            material = front ? sides.first : sides.second;
-            if (!front) s.shading = -s.shading;
+        scene.blocked(connections, count, true, blocked);
+        for (int i = 0; i < count; ++i)
+            if (!blocked[i]) paths[i].result += connections[i].light;
+    } else {
+        for (int i = 0; i < count; ++i) {
+            paths[i].ray = sensor_ray(sensor, film_position(film, x, y, {film_block.a[i], film_block.b[i]}));
+            alive[living++] = i;
         }
-        const Vec3& z = kind == Vertex::Kind::medium ? back : s.shading;
-        const Frame frame(z);
-        const Vertex vertex{kind, s.p, s.normal, distance, frame, scene.bsdf(s, material), frame.to_local(back)};
-
-        const bool sampled = kind != Vertex::Kind::surface || !vertex.bsdf.is_delta();
-        if (sampled && (strategy == Strategy::light || strategy == Strategy::mis) && bounce + 1 >= method.first_bounce)
-            result += throughput * sample_direct(scene, vertex, strategy, sampler);
-
-        const BsdfSample next = vertex.sample(scene, strategy, sampler);
-        throughput *= next.weight;
-        if (is_black(throughput)) return result;
-        delta = next.delta, pdf = next.pdf, bent *= next.bent, diffuse = vertex.is_diffuse();
-        ++bounce;
-        // What refraction did to the radiance on the way in it undoes on the way out, so that counts for nothing here.
-        if (bounce >= roulette_from) {
-            float survives = std::min(max_component(throughput) * bent, 1.0f);
-            if (bounce >= roulette_for_all_from) survives = std::min(survives, 0.95f);
-            if (survives < 1) {
-                if (sampler.next_1d() >= survives) return result;
-                throughput *= 1 / survives;
-            }
-        }
-        from = s.p;
-        ray = {vertex.leave(next.to_light), next.to_light};
     }
+    // Rays of a pixel, and those from where they arrive to a light, are close together; later ones are not.
+    for (bool together = !at_meter; living > 0; together = false) {
+        Ray rays[batch];
+        bool hits[batch];
+        for (int k = 0; k < living; ++k) rays[k] = paths[alive[k]].ray;
+        scene.intersect(rays, living, together, surfaces, hits);
+        const Draws draws(scene, sampler, step++);
+        const int arrived = living;
+        int owners[batch];
+        living = 0;
+        for (int k = 0; k < arrived; ++k) {
+            const int i = owners[k] = alive[k];
+            connections[k].light = {};
+            if (arrive(scene, method, paths[i], hits[k], surfaces[k], draws.of(i), connections[k])) alive[living++] = i;
+        }
+        scene.blocked(connections, arrived, together, blocked);
+        for (int k = 0; k < arrived; ++k)
+            if (!blocked[k]) paths[owners[k]].result += connections[k].light;
+    }
+    for (int i = 0; i < count; ++i) results[i] = paths[i].result;
 }
 
 }  // namespace oracle

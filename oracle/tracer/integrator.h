@@ -21,9 +21,21 @@ struct Method {
     int bounces = 1 << 30;  // more reflections than this are not followed
 };
 
-// Radiance, or irradiance at a meter, of one sample of pixel (x, y).
-Color measure(const Scene& scene, const Sensor& sensor, const Film& film, const Method& method, int x, int y,
-              Sampler& sampler);
+// What is known of a path: where it is, and the light found so far.
+struct Path {
+    Color result{}, throughput{1, 1, 1};
+    Ray ray{};
+    int bounce = 0;
+    Vec3 from{};           // the vertex before, where the ray was chosen
+    float pdf = 0;         // with which it was
+    bool delta = true;     // if there was no choice
+    bool diffuse = false;  // whether that vertex scatters evenly
+    float bent = 1;        // product of the squared relative indices that were passed
+};
+
+// The radiance, or the irradiance at a meter, of the first `count` samples of a batch of pixel (x, y).
+void measure(const Scene& scene, const Sensor& sensor, const Film& film, const Method& method, int x, int y,
+             const Sampler& sampler, int count, Color* results);
 
 // The ray through a point of the film; not for an irradiance meter.
 Ray sensor_ray(const Sensor& sensor, const Vec2& film_position);

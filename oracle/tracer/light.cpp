@@ -11,8 +11,7 @@ using Kind = Light::Kind;
 constexpr float near = 0.1f;
 
 bool is_near(const Light& l, const Vec3& from) {
-    const Vec3 center = l.kind == Kind::rectangle ? l.p + 0.5f * (l.u + l.v) : l.p + (1.0f / 3) * (l.u + l.v);
-    return l.area > near * length_squared(center - from);
+    return l.area > near * length_squared(l.center - from);
 }
 
 // A rectangle as seen from a point, in the coordinates of its edges (Ureña, Fajardo and King 2013).
@@ -215,21 +214,13 @@ bool is_sampled_evenly(const Light& l, const Vec3& from) {
 
 float importance(const Light& l, const Vec3& from) {
     constexpr float least = 1e-30f;
-    switch (l.kind) {
-        case Kind::directional: return mean(l.light) + least;
-        case Kind::point:
-        case Kind::spot: return mean(l.light) / std::max(length_squared(l.p - from), least) + least;
-        case Kind::sphere: {
-            const float d2 = std::max(length_squared(l.p - from), squared(l.radius));
-            return mean(l.light) * pi * squared(l.radius) / d2 + least;
-        }
-        default: {
-            const Vec3 center = l.kind == Kind::disk ? l.p : l.p + (l.kind == Kind::triangle ? 1.0f / 3 : 0.5f) * (l.u + l.v);
-            // Never more than the whole hemisphere; behind a one-sided light there is none.
-            if (!l.two_sided && dot(from - l.p, l.n) <= 0) return least;
-            return mean(l.light) * std::min(l.area / std::max(length_squared(center - from), least), pi) + least;
-        }
-    }
+    if (l.kind == Kind::directional) return l.brightness + least;
+    const float d2 = length_squared(l.center - from) + least;
+    if (l.is_delta()) return l.brightness / d2 + least;
+    if (l.kind == Kind::sphere) return l.brightness * pi * squared(l.radius) / std::max(d2, squared(l.radius)) + least;
+    // Behind a one-sided light there is none, and never more than from the whole hemisphere.
+    if (!l.two_sided && dot(from - l.p, l.n) <= 0) return least;
+    return l.brightness * std::min(l.area / d2, pi) + least;
 }
 
 }  // namespace oracle

@@ -50,8 +50,7 @@ float pdf_rough_conductor(const Material& m, const Vec3& eye, const Vec3& light)
     return Ggx{m.alpha, m.separable}.visible_density(eye, h.m) / (4 * h.eye);
 }
 
-BsdfSample sample_rough_conductor(const Material& m, const Vec3& eye, Sampler& sampler) {
-    const Vec2 u = sampler.next_2d();
+BsdfSample sample_rough_conductor(const Material& m, const Vec3& eye, const Vec2& u) {
     if (eye.z <= 0) return {};
     const Ggx ggx{m.alpha, m.separable};
     const Vec3 facet = ggx.sample_visible(eye, u);
@@ -94,9 +93,7 @@ float pdf_rough_dielectric(const Material& m, const Vec3& eye, const Vec3& light
     return reflects ? seen * f / (4 * std::fabs(h.eye)) : seen * (1 - f) * refraction_jacobian(h, eta);
 }
 
-BsdfSample sample_rough_dielectric(const Material& m, const Vec3& eye, Sampler& sampler) {
-    const Vec2 u = sampler.next_2d();
-    const float choice = sampler.next_1d();
+BsdfSample sample_rough_dielectric(const Material& m, const Vec3& eye, const Vec2& u, float choice) {
     if (eye.z == 0) return {};
     const Ggx ggx{m.alpha, m.separable};
     const float side = eye.z > 0 ? 1.0f : -1.0f, eta = relative_index(m, eye);
@@ -123,8 +120,7 @@ float phong_pdf(const Material& m, const Vec3& eye, const Vec3& light) {
     return cosine <= 0 ? 0 : (m.exponent + 1) / (2 * pi) * std::pow(cosine, m.exponent);
 }
 
-BsdfSample sample_phong(const Material& m, const Color& reflectance, const Vec3& eye, Sampler& sampler) {
-    const Vec2 u = sampler.next_2d();
+BsdfSample sample_phong(const Material& m, const Color& reflectance, const Vec3& eye, const Vec2& u) {
     if (eye.z <= 0) return {};
     const float cosine = std::pow(1 - u.x, 1 / (m.exponent + 1)), sine = safe_sqrt(1 - cosine * cosine);
     const float phi = 2 * pi * u.y;
@@ -151,9 +147,7 @@ float coat_probability(const Material& m, const Color& reflectance, float eye_co
     return f / (f + (1 - f) * mean(reflectance));
 }
 
-BsdfSample sample_plastic(const Material& m, const Color& reflectance, const Vec3& eye, Sampler& sampler) {
-    const Vec2 u = sampler.next_2d();
-    const float choice = sampler.next_1d();
+BsdfSample sample_plastic(const Material& m, const Color& reflectance, const Vec3& eye, const Vec2& u, float choice) {
     if (eye.z <= 0) return {};
     float refracted;
     const float coat = coat_probability(m, reflectance, eye.z);
@@ -164,8 +158,7 @@ BsdfSample sample_plastic(const Material& m, const Color& reflectance, const Vec
     return {light, plastic_base(m, reflectance, eye.z, light.z) / (1 - coat), (1 - coat) * light.z * inv_pi};
 }
 
-BsdfSample sample_dielectric(const Material& m, const Vec3& eye, Sampler& sampler) {
-    const float choice = sampler.next_1d();
+BsdfSample sample_dielectric(const Material& m, const Vec3& eye, float choice) {
     if (eye.z == 0) return {};
     const float eta = relative_index(m, eye);
     float refracted;
@@ -198,11 +191,8 @@ bool Bsdf::transmits() const {
     return material.kind == Kind::dielectric || material.kind == Kind::rough_dielectric;
 }
 
-Color Bsdf::evaluate(const Vec3& eye, const Vec3& light) const {
+Color Bsdf::evaluate_other(const Vec3& eye, const Vec3& light) const {
     switch (material.kind) {
-        case Kind::diffuse:
-            if (eye.z <= 0 || light.z <= 0) return {};
-            return light.z * inv_pi * material.reflectance.at(textures, uv);
         case Kind::rough_conductor: return evaluate_rough_conductor(material, eye, light);
         case Kind::rough_dielectric: return evaluate_rough_dielectric(material, eye, light);
         case Kind::phong: {
@@ -220,9 +210,8 @@ Color Bsdf::evaluate(const Vec3& eye, const Vec3& light) const {
     }
 }
 
-float Bsdf::pdf(const Vec3& eye, const Vec3& light) const {
+float Bsdf::pdf_other(const Vec3& eye, const Vec3& light) const {
     switch (material.kind) {
-        case Kind::diffuse: return eye.z > 0 && light.z > 0 ? light.z * inv_pi : 0;
         case Kind::rough_conductor: return pdf_rough_conductor(material, eye, light);
         case Kind::rough_dielectric: return pdf_rough_dielectric(material, eye, light);
         case Kind::phong: return eye.z > 0 && light.z > 0 ? phong_pdf(material, eye, light) : 0;
@@ -236,27 +225,27 @@ float Bsdf::pdf(const Vec3& eye, const Vec3& light) const {
     }
 }
 
-BsdfSample Bsdf::sample(const Vec3& eye, Sampler& sampler) const {
+BsdfSample Bsdf::sample_other(const Vec3& eye, const Vec2& u, float choice) const {
     switch (material.kind) {
         case Kind::diffuse: {
-            const Vec2 u = sampler.next_2d();
-            if (eye.z <= 0) return {};
+                    if (eye.z <= 0) return {};
             const Vec3 light = square_to_cosine_hemisphere(u);
             return {light, material.reflectance.at(textures, uv), light.z * inv_pi};
         }
         case Kind::mirror: return {mirrored(eye), material.reflectance.at(textures, uv), 0, true};
-        case Kind::dielectric: return sample_dielectric(material, eye, sampler);
+        case Kind::dielectric: return sample_dielectric(material, eye, choice);
         case Kind::conductor:
             if (eye.z <= 0) return {};
             return {mirrored(eye), conductor_reflectance(eye.z, material.eta, material.k), 0, true};
-        case Kind::rough_conductor: return sample_rough_conductor(material, eye, sampler);
-        case Kind::rough_dielectric: return sample_rough_dielectric(material, eye, sampler);
-        case Kind::phong: return sample_phong(material, material.reflectance.at(textures, uv), eye, sampler);
-        case Kind::plastic: return sample_plastic(material, material.reflectance.at(textures, uv), eye, sampler);
+        case Kind::rough_conductor: return sample_rough_conductor(material, eye, u);
+        case Kind::rough_dielectric: return sample_rough_dielectric(material, eye, u, choice);
+        case Kind::phong: return sample_phong(material, material.reflectance.at(textures, uv), eye, u);
+        case Kind::plastic: return sample_plastic(material, material.reflectance.at(textures, uv), eye, u, choice);
         case Kind::mix: {
             // A direction from one of the parts; where both can give it, their densities add up.
-            const bool second = sampler.next_1d() < material.weight;
-            BsdfSample s = part(second ? material.second : material.first).sample(eye, sampler);
+            const bool second = choice < material.weight;
+            const float rest = second ? choice / material.weight : (choice - material.weight) / (1 - material.weight);
+            BsdfSample s = part(second ? material.second : material.first).sample(eye, u, rest);
             if (s.delta || is_black(s.weight)) return s;
             s.pdf = pdf(eye, s.to_light);
             s.weight = evaluate(eye, s.to_light) / s.pdf;

@@ -4,7 +4,6 @@
 
 #include <vector>
 
-#include "sampler.h"
 #include "texture.h"
 #include "vec.h"
 
@@ -55,12 +54,33 @@ struct Bsdf {
     bool is_delta() const;
     bool has_delta() const;  // whether part of it is, so that `evaluate` is not everything
     bool transmits() const;
-    Color evaluate(const Vec3& to_eye, const Vec3& to_light) const;  // f |cos|
-    float pdf(const Vec3& to_eye, const Vec3& to_light) const;
-    BsdfSample sample(const Vec3& to_eye, Sampler& sampler) const;
+
+    // f |cos|. Diffuse surfaces are so frequent that they are treated here.
+    Color evaluate(const Vec3& to_eye, const Vec3& to_light) const {
+        if (material.kind != Material::Kind::diffuse) return evaluate_other(to_eye, to_light);
+        if (to_eye.z <= 0 || to_light.z <= 0) return {};
+        return to_light.z * inv_pi * material.reflectance.at(textures, uv);
+    }
+
+    float pdf(const Vec3& to_eye, const Vec3& to_light) const {
+        if (material.kind != Material::Kind::diffuse) return pdf_other(to_eye, to_light);
+        return to_eye.z > 0 && to_light.z > 0 ? to_light.z * inv_pi : 0;
+    }
+
+    // `u` and `choice` are uniform in [0, 1).
+    BsdfSample sample(const Vec3& to_eye, const Vec2& u, float choice) const {
+        if (material.kind != Material::Kind::diffuse) return sample_other(to_eye, u, choice);
+        if (to_eye.z <= 0) return {};
+        const Vec3 light = square_to_cosine_hemisphere(u);
+        return {light, material.reflectance.at(textures, uv), light.z * inv_pi};
+    }
+
     Color albedo() const;  // what the material's colour is called, for pictures
 
 private:
+    Color evaluate_other(const Vec3& to_eye, const Vec3& to_light) const;
+    float pdf_other(const Vec3& to_eye, const Vec3& to_light) const;
+    BsdfSample sample_other(const Vec3& to_eye, const Vec2& u, float choice) const;
     Bsdf part(int index) const { return {materials, textures, materials[size_t(index)], uv}; }
 };
 

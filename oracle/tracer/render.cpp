@@ -13,12 +13,21 @@ constexpr int tile = 16;
 // Larger than this a sample, in units of 2^exponent, is not added: its square would leave the range.
 constexpr double largest_sample = 0x1p28;
 
-void add(Sum& sum, double value, double unit) {
-    __extension__ using Wide = __int128;
-    const Wide before = (static_cast<Wide>(sum.high) << 64) | static_cast<Wide>(sum.low);
-    const Wide after = before + static_cast<Wide>(value * unit);
-    sum.low = static_cast<uint64_t>(after);
-    sum.high = static_cast<int64_t>(after >> 64);
+// Adds a value in [0, 2^62) times 2^`shift`, rounded down to an integer; `shift` is between 0 and 64.
+void add(Sum& sum, double value, int shift) {
+    // Its first 63 bits, as an integer and where they belong.
+    int exponent;
+    const auto digits = static_cast<uint64_t>(std::frexp(value, &exponent) * 0x1p63);
+    const int left = exponent - 63 + shift;
+    uint64_t low = 0, high = 0;
+    if (left >= 64)
+        high = digits << (left - 64);
+    else if (left > 0)
+        low = digits << left, high = digits >> (64 - left);
+    else if (left > -64)
+        low = digits >> -left;
+    sum.low += low;
+    sum.high += static_cast<int64_t>(high + (sum.low < low));
 }
 
 Defect::Kind defect_of(const Color& c, double scale) {
@@ -47,27 +56,33 @@ struct Work {
 Defect render_pass(const Scene& scene, const Sensor& sensor, const Film& film, const Pass& pass, int threads, Sum* sums,
                    Sum* squares, const std::function<bool(double)>& watch) {
     const int columns = (film.width + tile - 1) / tile, rows = (film.height + tile - 1) / tile, tiles = columns * rows;
-    const double scale = std::ldexp(1.0, -pass.exponent), unit = 0x1p64 * scale, square_unit = 0x1p60 * scale * scale;
+    const double scale = std::ldexp(1.0, -pass.exponent);
     Work work;
 
     const auto render_pixel = [&](int x, int y) {
         const size_t pixel = size_t(y) * size_t(film.width) + size_t(x);
-        for (uint32_t i = 0; i < pass.samples; ++i) {
-            const uint32_t index = pass.first_sample + i;
-            Sampler sampler(pass.sampler, pass.seed, uint32_t(pixel), index, pass.replicates);
-            const Color c = measure(scene, sensor, film, pass.method, x, y, sampler);
-            if (const auto kind = defect_of(c, scale); kind != Defect::Kind::none) {
-                const std::lock_guard lock(work.mutex);
-                work.defect = {kind, x, y, index};
-                work.stop = true;
-                return;
-            }
-            Sum* sum = sums + (pixel * pass.replicates + index % pass.replicates) * 3;
-            Sum* square = squares + pixel * 3;
-            const float channels[] = {c.x, c.y, c.z};
-            for (int k = 0; k < 3; ++k) {
-                add(sum[k], channels[k], unit);
-                add(square[k], double(channels[k]) * channels[k], square_unit);
+        Sum* square = squares + pixel * 3;
+        for (uint32_t done = 0; done < pass.samples; done += batch) {
+            const uint32_t first = pass.first_sample + done;
+            const int count = int(std::min<uint32_t>(batch, pass.samples - done));
+            const Sampler sampler(pass.sampler, pass.seed, uint32_t(pixel), first, pass.replicates);
+            Color results[batch];
+            measure(scene, sensor, film, pass.method, x, y, sampler, count, results);
+            for (int i = 0; i < count; ++i) {
+                const Color& c = results[i];
+                const uint32_t index = first + uint32_t(i);
+                if (const auto kind = defect_of(c, scale); kind != Defect::Kind::none) {
+                    const std::lock_guard lock(work.mutex);
+                    work.defect = {kind, x, y, index};
+                    work.stop = true;
+                    return;
+                }
+                Sum* sum = sums + (pixel * pass.replicates + index % pass.replicates) * 3;
+                const double channels[] = {c.x * scale, c.y * scale, c.z * scale};
+                for (int k = 0; k < 3; ++k) {
+                    add(sum[k], channels[k], 64);
+                    add(square[k], channels[k] * channels[k], 60);
+                }
             }
         }
     };

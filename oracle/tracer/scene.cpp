@@ -8,6 +8,7 @@ namespace oracle {
 namespace {
 
 constexpr size_t few_lights = 16;
+constexpr float infinity = std::numeric_limits<float>::infinity();
 
 // Normals go with the inverse of the map, transposed: but for a positive factor its cofactors, turned over by mirroring,
 // so that a mirrored object keeps its front.
@@ -29,6 +30,18 @@ RTCRay make_ray(const Vec3& o, const Vec3& d, float t_far) {
     ray.id = 0;
     ray.flags = 0;
     return ray;
+}
+
+// The k-th of eight rays.
+template <typename Rays>
+void set_ray(Rays& rays, int k, const Vec3& o, const Vec3& d, float t_far) {
+    rays.org_x[k] = o.x, rays.org_y[k] = o.y, rays.org_z[k] = o.z;
+    rays.tnear[k] = 0;
+    rays.dir_x[k] = d.x, rays.dir_y[k] = d.y, rays.dir_z[k] = d.z;
+    rays.time[k] = 0;
+    rays.tfar[k] = t_far;
+    rays.mask[k] = ~0u;
+    rays.id[k] = rays.flags[k] = 0;
 }
 
 // Bounds that hold after rounding to single precision.
@@ -55,9 +68,8 @@ struct UserGeometry {
         set_bounds(args->bounds_o, g.center, extent);
     }
 
-    // The nearest distance within (near, far), or infinity.
+    // The nearest distance between those of the ray, or infinity.
     static float distance(const Geometry& g, const RTCRay& ray) {
-        constexpr float none = std::numeric_limits<float>::infinity();
         const double ox = double(ray.org_x) - g.center.x, oy = double(ray.org_y) - g.center.y,
                      oz = double(ray.org_z) - g.center.z;
         const double dx = ray.dir_x, dy = ray.dir_y, dz = ray.dir_z;
@@ -65,40 +77,47 @@ struct UserGeometry {
         const auto inside = [&](double t) { return t > ray.tnear && t < ray.tfar; };
         if (g.kind == Scene::Kind::disk) {
             const double facing = dx * g.normal.x + dy * g.normal.y + dz * g.normal.z;
-            if (facing == 0) return none;
+            if (facing == 0) return infinity;
             const double t = -(ox * g.normal.x + oy * g.normal.y + oz * g.normal.z) / facing;
             const double x = ox + t * dx, y = oy + t * dy, z = oz + t * dz;
-            return inside(t) && x * x + y * y + z * z <= r2 ? float(t) : none;
+            return inside(t) && x * x + y * y + z * z <= r2 ? float(t) : infinity;
         }
         // From the point of the ray that is nearest to the center, half a chord back or forth.
         const double d2 = dx * dx + dy * dy + dz * dz;
         const double middle = -(ox * dx + oy * dy + oz * dz) / d2;
         const double x = ox + middle * dx, y = oy + middle * dy, z = oz + middle * dz;
         const double h2 = (r2 - (x * x + y * y + z * z)) / d2;
-        if (h2 < 0) return none;
+        if (h2 < 0) return infinity;
         const double half = std::sqrt(h2);
         if (inside(middle - half)) return float(middle - half);
-        return inside(middle + half) ? float(middle + half) : none;
+        return inside(middle + half) ? float(middle + half) : infinity;
     }
 
     static void intersect(const RTCIntersectFunctionNArguments* args) {
-        if (!args->valid[0]) return;
         const auto& g = *static_cast<const Geometry*>(args->geometryUserPtr);
-        auto& query = *reinterpret_cast<RTCRayHit*>(args->rayhit);  // one ray at a time
-        const float t = distance(g, query.ray);
-        if (!(t < query.ray.tfar)) return;
-        query.ray.tfar = t;
-        query.hit.geomID = args->geomID;
-        query.hit.primID = 0;
-        query.hit.instID[0] = args->context->instID[0];
-        query.hit.u = query.hit.v = 0;
+        RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, args->N);
+        RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, args->N);
+        for (unsigned i = 0; i < args->N; ++i) {
+            if (!args->valid[i]) continue;
+            const RTCRay ray = rtcGetRayFromRayN(rays, args->N, i);
+            const float t = distance(g, ray);
+            if (!(t < ray.tfar)) continue;
+            RTCRayN_tfar(rays, args->N, i) = t;
+            RTCHitN_geomID(hits, args->N, i) = args->geomID;
+            RTCHitN_primID(hits, args->N, i) = 0;
+            RTCHitN_instID(hits, args->N, i, 0) = args->context->instID[0];
+            RTCHitN_u(hits, args->N, i) = RTCHitN_v(hits, args->N, i) = 0;
+            RTCHitN_Ng_x(hits, args->N, i) = RTCHitN_Ng_y(hits, args->N, i) = RTCHitN_Ng_z(hits, args->N, i) = 0;
+        }
     }
 
     static void occluded(const RTCOccludedFunctionNArguments* args) {
-        if (!args->valid[0]) return;
         const auto& g = *static_cast<const Geometry*>(args->geometryUserPtr);
-        auto& ray = *reinterpret_cast<RTCRay*>(args->ray);
-        if (distance(g, ray) < ray.tfar) ray.tfar = -std::numeric_limits<float>::infinity();
+        for (unsigned i = 0; i < args->N; ++i) {
+            if (!args->valid[i]) continue;
+            const RTCRay ray = rtcGetRayFromRayN(args->ray, args->N, i);
+            if (distance(g, ray) < ray.tfar) RTCRayN_tfar(args->ray, args->N, i) = -infinity;
+        }
     }
 };
 
@@ -159,6 +178,11 @@ Owned<RTCGeometry> Scene::make_mesh(const Mesh& mesh) const {
 
 void Scene::add_mesh(int object, Mesh mesh) {
     const auto geometry = make_mesh(mesh);
+    is_small_ &= mesh.triangles.size() + few_.size() <= Few::most;
+    for (uint32_t i = 0; is_small_ && i < mesh.triangles.size(); ++i) {
+        const Triangle& t = mesh.triangles[i];
+        add_flat(mesh.vertices[t.a], mesh.vertices[t.b], mesh.vertices[t.c], false, i);
+    }
     Geometry description{Kind::mesh, uint32_t(object)};
     add_area_lights(object, description, &mesh);
     // Corners are Embree's business; what is kept is looked up at hits.
@@ -183,7 +207,15 @@ void Scene::add_rectangle(int object, const Vec3& corner, const Vec3& u, const V
     Geometry description{Kind::rectangle, uint32_t(object)};
     description.center = corner, description.u = u, description.v = v, description.normal = normalize(cross(u, v));
     add_area_lights(object, description, nullptr);
+    is_small_ &= few_.size() < Few::most;
+    if (is_small_) add_flat(corners[0], corners[1], corners[3], true, 0);
     attach(geometry.get(), description);
+}
+
+// To be called before the geometry is attached.
+void Scene::add_flat(const Vec3& a, const Vec3& b, const Vec3& c, bool parallelogram, uint32_t primitive) {
+    few_.add(a, b, c, parallelogram);
+    flat_.push_back({uint32_t(geometries_.size()), primitive, cross(b - a, c - a)});
 }
 
 void Scene::add_disk(int object, const Vec3& center, const Vec3& normal, float radius) {
@@ -216,6 +248,7 @@ void Scene::add_instances(int object, Mesh mesh, const std::vector<Affine>& tran
         meshes_.push_back(std::make_unique<Mesh>(std::move(mesh)));
         description.mesh = int(meshes_.size()) - 1;
     }
+    is_small_ = false;
     for (const Affine& transform : transforms) {
         const Owned<RTCGeometry> instance(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
         rtcSetGeometryInstancedScene(instance.get(), prototype);
@@ -242,13 +275,15 @@ void Scene::add_area_lights(int object, const Geometry& g, const Mesh* mesh) {
                 light.area = 0.5f * length(normal);
                 light.n = light.area > 0 ? normalize(normal) : Vec3{0, 0, 1};
                 if (!mesh->uv.empty()) light.uv[0] = mesh->uv[t.a], light.uv[1] = mesh->uv[t.b], light.uv[2] = mesh->uv[t.c];
-                lights.push_back(light);
+                light.center = light.p + (1.0f / 3) * (light.u + light.v);
+                add_light(light);
             }
             return;
         case Kind::rectangle:
             light.kind = Light::Kind::rectangle;
             light.p = g.center, light.u = g.u, light.v = g.v, light.n = g.normal;
             light.area = length(cross(g.u, g.v));
+            light.center = g.center + 0.5f * (g.u + g.v);
             light.uv[1] = {1, 0}, light.uv[2] = {0, 1};
             break;
         case Kind::disk: {
@@ -256,16 +291,20 @@ void Scene::add_area_lights(int object, const Geometry& g, const Mesh* mesh) {
             light.kind = Light::Kind::disk;
             light.p = g.center, light.u = g.radius * frame.x, light.v = g.radius * frame.y, light.n = g.normal;
             light.radius = g.radius, light.area = pi * squared(g.radius);
+            light.center = g.center;
             break;
         }
         default:
             light.kind = Light::Kind::sphere;
-            light.p = g.center, light.radius = g.radius, light.area = 4 * pi * squared(g.radius);
+            light.p = light.center = g.center, light.radius = g.radius, light.area = 4 * pi * squared(g.radius);
     }
-    lights.push_back(light);
+    add_light(light);
 }
 
-void Scene::add_light(const Light& light) { lights.push_back(light); }
+void Scene::add_light(const Light& light) {
+    lights.push_back(light);
+    lights.back().brightness = mean(light.light);
+}
 
 void Scene::set_environment(Environment e) {
     environment = std::move(e);
@@ -278,10 +317,13 @@ void Scene::set_medium(const Color& absorption_in, const Color& scattering_in, f
     scatters = !is_black(scattering);
 }
 
-void Scene::commit() {
+void Scene::commit(bool hierarchy) {
+    is_small_ &= !hierarchy;
     // Only now do the descriptions of user geometries stay where they are.
     for (size_t i = 0; i < geometries_.size(); ++i) {
         if (geometries_[i].kind != Kind::disk && geometries_[i].kind != Kind::sphere) continue;
+        round_.push_back(uint32_t(i));
+        is_small_ &= round_.size() <= Few::most / 4;
         RTCGeometry geometry = rtcGetGeometry(scene_.get(), unsigned(i));
         rtcSetGeometryUserPrimitiveCount(geometry, 1);
         rtcSetGeometryUserData(geometry, &geometries_[i]);
@@ -293,55 +335,125 @@ void Scene::commit() {
     rtcCommitScene(scene_.get());
     check("build the scene");
 
+    needs_choices = has_medium || std::any_of(materials.begin(), materials.end(), [](const Material& m) {
+                        using Kind = Material::Kind;
+                        return m.kind == Kind::dielectric || m.kind == Kind::rough_dielectric || m.kind == Kind::plastic ||
+                               m.kind == Kind::mix;
+                    });
     samples_environment = !environment.is_smooth();
     environment_importance_ = pi * mean(environment.mean_radiance()) + 1e-30f;
     double sum = 0;
     std::vector<double> cumulated;
-    for (const Light& l : lights) cumulated.push_back(sum += std::max(mean(l.light) * (l.is_delta() ? 1 : l.area), 1e-30f));
+    for (const Light& l : lights) cumulated.push_back(sum += std::max(l.brightness * (l.is_delta() ? 1 : l.area), 1e-30f));
     // A fifth of the samples, whatever the sizes in the scene.
     if (samples_environment) cumulated.push_back(sum += std::max(0.25 * sum, 1e-30));
     for (const double c : cumulated) light_cdf_.push_back(float(c / sum));
     if (!light_cdf_.empty()) light_cdf_.back() = 1;
 }
 
+bool Scene::closest_of_few(const Ray& ray, Hit& hit) const {
+    const Few::Hit found = few_.closest(ray.origin, ray.direction, infinity);
+    hit.distance = float(found.distance), hit.u = found.u, hit.v = found.v;
+    if (found.index >= 0) {
+        const Flat& flat = flat_[size_t(found.index)];
+        hit.normal = flat.normal, hit.geometry = flat.geometry, hit.primitive = flat.primitive;
+    }
+    bool any = found.index >= 0;
+    for (const uint32_t i : round_) {
+        const float t = UserGeometry::distance(geometries_[i], make_ray(ray.origin, ray.direction, hit.distance));
+        if (!(t < hit.distance)) continue;
+        hit.distance = t, hit.geometry = i, hit.primitive = 0;
+        any = true;
+    }
+    return any;
+}
+
+bool Scene::is_blocked_by_few(const Connection& c) const {
+    if (few_.closest(c.from, c.direction, c.distance).index >= 0) return true;
+    return std::any_of(round_.begin(), round_.end(), [&](uint32_t i) {
+        return UserGeometry::distance(geometries_[i], make_ray(c.from, c.direction, c.distance)) < c.distance;
+    });
+}
+
 bool Scene::intersect(const Ray& ray, Surface& s) const {
+    Hit hit;
+    if (is_small_) {
+        if (!closest_of_few(ray, hit)) return false;
+        describe(ray, hit, s);
+        return true;
+    }
     RTCRayHit query;
-    query.ray = make_ray(ray.origin, ray.direction, std::numeric_limits<float>::infinity());
+    query.ray = make_ray(ray.origin, ray.direction, infinity);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     closest_hit(scene_.get(), query);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    const RTCHit& h = query.hit;
+    if (h.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    const uint32_t geometry = h.instID[0] == RTC_INVALID_GEOMETRY_ID ? h.geomID : h.instID[0];
+    describe(ray, {query.ray.tfar, h.u, h.v, {h.Ng_x, h.Ng_y, h.Ng_z}, geometry, h.primID}, s);
+    return true;
+}
 
-    const bool is_instance = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
-    const Geometry& g = geometries_[is_instance ? query.hit.instID[0] : query.hit.geomID];
-    s.distance = query.ray.tfar;
+void Scene::intersect(const Ray* rays, int count, bool together, Surface* surfaces, bool* hits) const {
+    if (!together || is_small_) {
+        for (int i = 0; i < count; ++i)
+            hits[i] = intersect(rays[i], surfaces[i]);
+        return;
+    }
+    for (int first = 0; first < count; first += 8) {
+        alignas(32) int valid[8];
+        RTCRayHit8 query;
+        for (int k = 0; k < 8; ++k) {
+            const int i = first + k;
+            valid[k] = i < count ? -1 : 0;
+            set_ray(query.ray, k, rays[valid[k] ? i : first].origin, rays[valid[k] ? i : first].direction, infinity);
+            query.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+            query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+        }
+        closest_hit8(scene_.get(), valid, query);
+        for (int k = 0; k < 8; ++k) {
+            if (!valid[k]) continue;
+            const int i = first + k;
+            hits[i] = query.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
+            if (!hits[i]) continue;
+            const auto& h = query.hit;
+            const uint32_t instance = h.instID[0][k], geometry = instance == RTC_INVALID_GEOMETRY_ID ? h.geomID[k] : instance;
+            const Vec3 normal{h.Ng_x[k], h.Ng_y[k], h.Ng_z[k]};
+            describe(rays[i], {query.ray.tfar[k], h.u[k], h.v[k], normal, geometry, h.primID[k]}, surfaces[i]);
+        }
+    }
+}
+
+void Scene::describe(const Ray& ray, const Hit& hit, Surface& s) const {
+    const Geometry& g = geometries_[hit.geometry];
+    s.distance = hit.distance;
     s.p = ray.origin + s.distance * ray.direction;
     s.object = g.object;
-    s.primitive = query.hit.primID;
+    s.primitive = hit.primitive;
     s.material = objects[g.object].material;
     switch (g.kind) {
         case Kind::disk:
             s.normal = s.shading = g.normal;
             s.p = s.p - dot(s.p - g.center, g.normal) * g.normal;
-            return true;
+            return;
         case Kind::sphere:
             s.normal = s.shading = normalize(s.p - g.center);
             s.p = g.center + g.radius * s.normal;
-            return true;
+            return;
         case Kind::rectangle:
             s.normal = s.shading = g.normal;
-            s.uv = {query.hit.u, query.hit.v};
-            return true;
+            s.uv = {hit.u, hit.v};
+            return;
         case Kind::mesh:
         case Kind::instance: break;
     }
-    Vec3 normal{query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z};
-    if (is_instance) normal = transformed_normal(g.transform, normal);
+    const bool is_instance = g.kind == Kind::instance;
+    const Vec3 normal = is_instance ? transformed_normal(g.transform, hit.normal) : hit.normal;
     s.normal = s.shading = normalize(normal);
-    if (g.mesh < 0) return true;
+    if (g.mesh < 0) return;
     const Mesh& mesh = *meshes_[size_t(g.mesh)];
     const Triangle& t = mesh.triangles[s.primitive];
-    const float b = query.hit.u, c = query.hit.v, a = 1 - b - c;
+    const float b = hit.u, c = hit.v, a = 1 - b - c;
     if (!mesh.uv.empty()) {
         const Vec2 &p = mesh.uv[t.a], &q = mesh.uv[t.b], &r = mesh.uv[t.c];
         s.uv = {a * p.x + b * q.x + c * r.x, a * p.y + b * q.y + c * r.y};
@@ -352,13 +464,36 @@ bool Scene::intersect(const Ray& ray, Surface& s) const {
         const float l = length(n);
         if (l > 0) s.shading = n / l;
     }
-    return true;
 }
 
-bool Scene::blocked(const Vec3& from, const Vec3& direction, float distance) const {
-    RTCRay ray = make_ray(from, direction, distance);
-    any_hit(scene_.get(), ray);
-    return ray.tfar < 0;
+
+void Scene::blocked(const Connection* connections, int count, bool together, bool* result) const {
+    if (!together || is_small_) {
+        for (int i = 0; i < count; ++i) {
+            const Connection& c = connections[i];
+            result[i] = is_black(c.light) || (is_small_ && is_blocked_by_few(c));
+            if (result[i] || is_small_) continue;
+            RTCRay ray = make_ray(c.from, c.direction, c.distance);
+            any_hit(scene_.get(), ray);
+            result[i] = ray.tfar < 0;
+        }
+        return;
+    }
+    for (int first = 0; first < count; first += 8) {
+        alignas(32) int valid[8];
+        RTCRay8 query;
+        bool any = false;
+        for (int k = 0; k < 8; ++k) {
+            const int i = first + k;
+            valid[k] = i < count && !is_black(connections[i].light) ? -1 : 0;
+            any |= valid[k] != 0;
+            const Connection nothing{};
+            const Connection& c = valid[k] ? connections[i] : nothing;
+            set_ray(query, k, c.from, c.direction, c.distance);
+        }
+        if (any) any_hit8(scene_.get(), valid, query);
+        for (int k = 0; k < 8 && first + k < count; ++k) result[first + k] = !valid[k] || query.tfar[k] < 0;
+    }
 }
 
 Color Scene::emitted(const Surface& s, const Vec3& towards) const {
@@ -372,19 +507,20 @@ int Scene::select_light(const Vec3& from, float& u, float& probability) const {
     if (count == 0) return -1;
     probability = 1;
     if (count == 1) return 0;
-    float weights[few_lights];
+    float cumulated[few_lights];
     const float* cdf = light_cdf_.data();
+    float sum = 1;
     if (count <= few_lights) {
-        float sum = 0;
-        for (size_t i = 0; i < lights.size(); ++i) weights[i] = sum += importance(lights[i], from);
-        if (samples_environment) weights[count - 1] = sum += environment_importance_;
-        for (size_t i = 0; i < count; ++i) weights[i] /= sum;
-        cdf = weights;
+        sum = 0;
+        for (size_t i = 0; i < lights.size(); ++i) cumulated[i] = sum += importance(lights[i], from);
+        if (samples_environment) cumulated[count - 1] = sum += environment_importance_;
+        cdf = cumulated;
     }
-    const size_t i = std::min<size_t>(size_t(std::upper_bound(cdf, cdf + count, u) - cdf), count - 1);
-    const float before = i ? cdf[i - 1] : 0;
-    probability = cdf[i] - before;
-    u = std::clamp((u - before) / probability, 0.0f, 0x1.fffffep-1f);
+    const float at = u * sum;
+    const size_t i = std::min<size_t>(size_t(std::upper_bound(cdf, cdf + count, at) - cdf), count - 1);
+    const float before = i ? cdf[i - 1] : 0, width = cdf[i] - before;
+    probability = width / sum;
+    u = std::clamp((at - before) / width, 0.0f, 0x1.fffffep-1f);
     return int(i);
 }
 
@@ -400,11 +536,16 @@ float Scene::light_probability(const Vec3& from, int light) const {
         if (k + 1 == i) before = sum;
         if (k == i) until = sum;
     }
-    return until / sum - before / sum;
+    return (until - before) / sum;
 }
 
 bool Scene::leave_to_sampling(const Light& light, const Vec3& from) const {
     return light_cdf_.size() <= few_lights && is_sampled_evenly(light, from);
+}
+
+bool Scene::leaves_all_to_sampling(const Vec3& from) const {
+    return environment.kind == Environment::Kind::none && light_cdf_.size() <= few_lights &&
+           std::all_of(lights.begin(), lights.end(), [&](const Light& l) { return is_sampled_evenly(l, from); });
 }
 
 }  // namespace oracle

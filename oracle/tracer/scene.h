@@ -9,6 +9,7 @@
 
 #include "embree_compat.h"
 #include "environment.h"
+#include "few.h"
 #include "light.h"
 #include "material.h"
 
@@ -49,6 +50,13 @@ struct Surface {
     int material;  // -1 is black
 };
 
+// Light that comes from somewhere if nothing is in between. Its ends are off their surfaces.
+struct Connection {
+    Vec3 from, direction;  // a unit vector
+    float distance;
+    Color light;
+};
+
 class Scene {
 public:
     Scene();
@@ -64,12 +72,15 @@ public:
     void add_light(const Light& light);
     void set_environment(Environment environment);
     void set_medium(const Color& absorption, const Color& scattering, float asymmetry);
-    void commit();
+    // Few surfaces are searched without Embree, unless `hierarchy` asks for it.
+    void commit(bool hierarchy = false);
 
     // The nearest surface beyond the ray's origin; false if there is none.
     bool intersect(const Ray& ray, Surface& surface) const;
-    // Whether anything is between two points that were moved off their surfaces.
-    bool blocked(const Vec3& from, const Vec3& direction, float distance) const;
+    // The same for many rays, eight at once if `together`.
+    void intersect(const Ray* rays, int count, bool together, Surface* surfaces, bool* hits) const;
+    // Which connections something blocks; those without light count as blocked.
+    void blocked(const Connection* connections, int count, bool together, bool* result) const;
 
     Bsdf bsdf(const Surface& surface, int material) const {
         return {materials, textures, materials[size_t(material)], surface.uv};
@@ -82,6 +93,8 @@ public:
     float light_probability(const Vec3& from, int light) const;
     // Whether a diffuse surface at `from` had better leave the light to being sampled: it would only gain noise.
     bool leave_to_sampling(const Light& light, const Vec3& from) const;
+    bool leaves_all_to_sampling(const Vec3& from) const;
+    bool has_smooth_environment() const { return environment.kind != Environment::Kind::none && !samples_environment; }
 
     std::vector<Texture> textures;
     std::vector<Material> materials;
@@ -91,6 +104,7 @@ public:
     Color absorption{}, scattering{};
     float asymmetry = 0;
     bool has_medium = false, scatters = false;
+    bool needs_choices = false;        // whether a medium or a material decides between ways to go on
     bool samples_environment = false;  // whether the environment is one of the lights to be selected, the last one
 
     RTCScene embree() const { return scene_.get(); }
@@ -108,6 +122,16 @@ private:
     };
     friend struct UserGeometry;
 
+    // What Embree tells of a hit, and this scene's own search among few surfaces.
+    struct Hit {
+        float distance, u, v;
+        Vec3 normal;  // of any length; untransformed, if on an instance
+        uint32_t geometry, primitive;
+    };
+    bool closest_of_few(const Ray& ray, Hit& hit) const;
+    bool is_blocked_by_few(const Connection& connection) const;
+    void describe(const Ray& ray, const Hit& hit, Surface& surface) const;
+    void add_flat(const Vec3& a, const Vec3& b, const Vec3& c, bool parallelogram, uint32_t primitive);
     void attach(RTCGeometry geometry, const Geometry& description);
     Owned<RTCGeometry> make_mesh(const Mesh& mesh) const;
     void add_area_lights(int object, const Geometry& geometry, const Mesh* mesh);
@@ -118,6 +142,16 @@ private:
     std::vector<Owned<RTCScene>> prototypes_;
     std::vector<Geometry> geometries_;
     std::vector<std::unique_ptr<Mesh>> meshes_;
+    // If there are so few surfaces that they need no hierarchy: flat ones with the geometry and primitive that they are, and
+    // the numbers of round ones.
+    struct Flat {
+        uint32_t geometry, primitive;
+        Vec3 normal;
+    };
+    bool is_small_ = true;
+    Few few_;
+    std::vector<Flat> flat_;
+    std::vector<uint32_t> round_;
     std::vector<float> light_cdf_;  // by power, where there are too many to look at each
     float environment_importance_ = 0;
 };

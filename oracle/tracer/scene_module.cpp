@@ -161,14 +161,14 @@ public:
     void add_point(const Numbers& position, const Numbers& intensity) {
         Light l{};
         l.kind = Light::Kind::point;
-        l.p = vector(position, "position"), l.light = vector(intensity, "intensity");
+        l.p = l.center = vector(position, "position"), l.light = vector(intensity, "intensity");
         open().add_light(l);
     }
 
     void add_spot(const Numbers& position, const Numbers& direction, const Numbers& intensity, double full, double cutoff) {
         Light l{};
         l.kind = Light::Kind::spot;
-        l.p = vector(position, "position"), l.n = unit(direction, "direction"), l.light = vector(intensity, "intensity");
+        l.p = l.center = vector(position, "position"), l.n = unit(direction, "direction"), l.light = vector(intensity, "intensity");
         l.full = number(full, "beam_width"), l.cutoff = number(cutoff, "cutoff_angle");
         if (!(l.cutoff > l.full)) throw py::value_error("cutoff_angle must exceed beam_width in single precision");
         open().add_light(l);
@@ -209,10 +209,10 @@ public:
         open().set_medium(vector(absorption, "absorption"), vector(scattering, "scattering"), number(asymmetry, "asymmetry"));
     }
 
-    void commit() {
+    void commit(bool hierarchy) {
         Scene& scene = open();
         const py::gil_scoped_release release;
-        scene.commit();
+        scene.commit(hierarchy);
         committed_ = true;
     }
 
@@ -391,7 +391,7 @@ void bind_scene(py::module_& module) {
         .def("set_sky", &Stage::set_sky, py::arg("up"), py::arg("horizon"), py::arg("zenith"))
         .def("set_map", &Stage::set_map, py::arg("radiance"), py::arg("up"), py::arg("front"))
         .def("set_medium", &Stage::set_medium, py::arg("absorption"), py::arg("scattering"), py::arg("asymmetry"))
-        .def("commit", &Stage::commit)
+        .def("commit", &Stage::commit, py::arg("hierarchy") = false)
         .def("render_pass", &Stage::render_pass, py::arg("sensor"), py::arg("film"), py::arg("render_pass"),
              py::arg("threads"), py::arg("sums").noconvert(), py::arg("squares").noconvert(), py::arg("watch"))
         .def("first_hits", &Stage::first_hits, py::arg("sensor"), py::arg("film"));

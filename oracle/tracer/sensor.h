@@ -1,7 +1,6 @@
 // Where the measured light arrives: cameras and meters.
 #pragma once
 
-#include "sampler.h"
 #include "vec.h"
 
 namespace oracle {
