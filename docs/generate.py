@@ -17,6 +17,7 @@ from graders.submission import Submission
 from oracle.truth import AnyCase
 from reference_scenes.families import FAMILIES
 from reference_scenes.model import Scene
+from reference_scenes.references import About
 
 HERE = Path(__file__).parent
 
@@ -28,6 +29,7 @@ def generated() -> dict[Path, str]:
         "submission": Submission,
         "rubric": Rubric,
         "result": Result,
+        "reference": About,
         "truth": Annotated[list[AnyCase], Field(title="Cases")],
     }
     files = {HERE / "schema" / f"{name}.schema.json": _schema(kind) for name, kind in kinds.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -180,6 +181,61 @@ def solid_angle() -> None:
 
     For example: oracle solid-angle sphere --center 0,0,2 --radius 0.5, or with --table center.z=1:100:20log.
     """
+
+
+@oracle.command(short_help="Render references where no closed form exists.")
+@click.argument("scenes", metavar="[SCENE]...", nargs=-1)
+@click.option("--spp", type=click.IntRange(1, 1 << 31), help="End at so many samples per pixel.")
+@click.option("--error", metavar="PERCENT", help="End at this relative standard error, such as 0.5%.")
+@click.option("--time", metavar="TIME", help="End after 30s, 5m or 2h.")
+@click.option(
+    "--share",
+    metavar="PERCENT",
+    default="95%",
+    show_default=True,
+    help="Of the pixels with light, the part that must reach the error.",
+)
+@click.option("--threads", type=click.IntRange(1, 1024), help="One for each processor without it.")
+@click.option("--seed", type=click.IntRange(0, (1 << 64) - 1), default=0, show_default=True, help="Draws the samples.")
+@click.option("--member", type=click.IntRange(0), default=0, show_default=True, help="Draws a family's scene.")
+@click.option(
+    "--sampler",
+    type=click.Choice(["sobol", "independent"]),
+    default="sobol",
+    show_default=True,
+    help="What the samples are: points of low discrepancy, or random.",
+)
+@click.option(
+    "--strategy",
+    type=click.Choice(["mis", "light", "bsdf", "hemisphere"]),
+    default="mis",
+    show_default=True,
+    help="How light is looked for at a surface.",
+)
+@click.option("--bounces", type=click.IntRange(0, 1 << 30), help="Reflections at most; no limit without it.")
+@click.option("--resume", is_flag=True, help="Go on from what is there, if there is anything.")
+@click.option("--aovs", is_flag=True, help="Write distance, position, direct light and more.")
+@click.option("--merge", is_flag=True, help="Merge references in folders SCENE... instead.")
+@click.option("--all", is_flag=True, help="Fill a cache with references of all scenes.")
+@click.option("--rubric", type=_PATH, help="With --all, only the scenes of this rubric.")
+@click.option("--check", is_flag=True, help="With --all, only tell what is fresh, stale, missing.")
+@click.option("-o", "--out", required=True, type=_PATH, help="Folder for the reference, or the cache.")
+@click.pass_context
+def reference(context: click.Context, /, **options: Any) -> int:
+    """Render a reference of SCENE, a scene file or the name of a scene, with its uncertainty.
+
+    Writes reference.exr, reference.json and state.npz. An interrupted rendering keeps what is done, and --resume goes
+    on. --check exits with 1 if a reference is stale or missing.
+
+    \b
+    oracle reference cornell-box --error 0.5% -o box
+    oracle reference --merge box other-seed -o both
+    oracle reference --all --spp 1024 -o cache
+    """
+    from graders.cli.reference import Request, run_reference
+
+    given = {name for name in options if context.get_parameter_source(name) != click.core.ParameterSource.DEFAULT}
+    return run_reference(Request(**options), given)
 
 
 @oracle.command(short_help="Tell what this installation can do.")
