@@ -1,6 +1,6 @@
 # Every target sets up what it needs first; on a fresh machine python3, make and a C++ compiler are enough.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint sanitize wheel-test lock calibrate verify bench generate picture clean
+.PHONY: help setup demo test lint sanitize wheel wheel-test lock calibrate verify bench generate picture clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 16
@@ -33,14 +33,17 @@ sanitize: setup ## the tracer's tests under AddressSanitizer and UndefinedBehavi
 	PYTHONPATH="$(CURDIR)/build/sanitize/site:$$packages" \
 	.venv/bin/python -SP -m pytest -p no:cacheprovider --capture=no tests/test_tracer.py
 
-# Source archive, wheel from it, empty environment, foreign folder: what a user of the wheel gets.
-wheel-test: setup ## build the wheel, install it elsewhere and run the demo there
-	@set -eu; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
-	.venv/bin/python -m build --no-isolation --outdir "$$folder/dist" . >"$$folder/log" || { cat "$$folder/log"; exit 1; }; \
-	sed -n 's/^\([a-z0-9.-]*==[^\\]*\).*/\1/p' requirements.lock >"$$folder/constraints.txt"; \
-	.venv/bin/python -m venv "$$folder/venv"; \
-	"$$folder/venv/bin/python" -m pip install -q --disable-pip-version-check -c "$$folder/constraints.txt" "$$folder"/dist/*.whl; \
-	mkdir "$$folder/elsewhere"; cd "$$folder/elsewhere"; "$$folder/venv/bin/oracle" demo --quick
+# The wheel is made from the source archive, outside of the checkout. auditwheel puts Embree and TBB into it, and names the
+# oldest system on which it runs.
+wheel: setup ## dist/: the source archive and a wheel that brings Embree along; Linux
+	@set -eu; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; rm -rf dist; \
+	{ .venv/bin/python -m build --no-isolation --outdir "$$folder" . && \
+	    PATH="$(CURDIR)/.venv/bin:$$PATH" auditwheel repair --wheel-dir dist "$$folder"/*.whl; \
+	} >"$$folder/log" 2>&1 || { cat "$$folder/log"; exit 1; }; \
+	mv "$$folder"/*.tar.gz dist; du -h --apparent-size dist/*
+
+wheel-test: wheel ## install the wheel where there is no Embree, and render with it
+	@.venv/bin/pytest -v tests/wheel.py
 
 lock: ## resolve requirements.lock anew
 	@set -eu; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
