@@ -1,6 +1,6 @@
 # Every target sets up what it needs first; on a fresh machine python3, make and a C++ compiler are enough.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint sanitize wheel wheel-test lock calibrate verify bench generate picture clean
+.PHONY: help setup demo test lint sanitize wheel wheel-test lock calibrate verify second-opinion bench generate picture clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 16
@@ -56,6 +56,9 @@ calibrate: setup ## false alarms and power of the judge, by simulation; minutes
 
 verify: setup ## every closed form against ball arithmetic in 20,000 configurations; most of an hour
 	@PYTHONPATH=tests .venv/bin/python tests/verification.py 20000
+
+second-opinion: setup ## render with Mitsuba what the tracer is compared with; most of an hour
+	@PYTHONPATH=tests .venv/bin/python tests/second_opinion.py
 
 bench: setup ## how fast the closed forms are; minutes
 	@for script in benchmarks/*.py; do echo "== $$script"; .venv/bin/python $$script || exit 1; done

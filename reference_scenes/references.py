@@ -127,7 +127,9 @@ def scene_digest(scene: model.Scene) -> str:
     def short(texels: Texels) -> list[Any]:
         return [*texels.array.shape, hashlib.sha256(np.ascontiguousarray(texels.array).data).hexdigest()]
 
-    return hashlib.sha256(json.dumps(scene.model_dump(), default=short).encode()).hexdigest()
+    # Texels as they are, which pydantic would warn of: as lists, large textures would need gigabytes.
+    data = scene.model_dump(warnings=False)
+    return hashlib.sha256(json.dumps(data, default=short).encode()).hexdigest()
 
 
 def joined(runs: tuple[Run, ...]) -> tuple[Run, ...]:

@@ -44,6 +44,7 @@ EVERYTHING = model.Scene(
 )
 
 
+CONSTANT = model.ConstantEmitter(radiance=(1.0, 1.0, 1.0))
 MATERIALS = {
     "diffuse": GREY,
     "mirror": model.Mirror(reflectance=(0.9, 0.8, 0.7)),
@@ -88,6 +89,7 @@ def with_part(part):
         scene["objects"] = (model.Object(shape=MESH, material=part), *EVERYTHING.objects)
     elif part in SENSORS.values():
         scene["camera"] = part
+        scene["emitters"] = (EVERYTHING.emitters[0], CONSTANT)
         if isinstance(part, model.RadianceMeter):
             scene["film"] = model.Film(width=1, height=1)
     elif isinstance(part, model.AreaEmitter):
@@ -206,7 +208,6 @@ def test_mitsuba_takes_colours_of_any_size_as_they_are(read):
 
 PHONG = model.Phong(reflectance=(0.5, 0.5, 0.5), exponent=10.0)
 CORRELATED = model.RoughDielectric(eta=1.5, alpha=0.1)
-CONSTANT = model.ConstantEmitter(radiance=(1.0, 1.0, 1.0))
 PHONG_WITHIN = model.Mix(first=GREY, second=PHONG, weight=0.5)
 
 
@@ -230,9 +231,13 @@ PHONG_WITHIN = model.Mix(first=GREY, second=PHONG, weight=0.5)
             {"emitters": (model.AreaEmitter(shape=TRIANGLES, radiance=(1.0, 1.0, 1.0), two_sided=True),)},
             "/emitters/0/two_sided: mitsuba3 has no two-sided emitters",
         ),
+        (
+            {"camera": SENSORS["irradiance meter"], "emitters": EVERYTHING.emitters},
+            "/emitters/1/type: mitsuba3's irradiance meters do not see point emitters",
+        ),
         ({"camera": SENSORS["radiance meter"]}, "/film: mitsuba3 has radiance meters of one pixel"),
     ],
-    ids=["phong", "phong within", "facets", "environments", "two-sided mesh", "radiance meter"],
+    ids=["phong", "phong within", "facets", "environments", "two-sided mesh", "irradiance meter", "radiance meter"],
 )
 def test_what_mitsuba_cannot_say_is_refused_by_name_and_leaves_no_file(tmp_path, changed, message):
     scene = model.Scene(**{"camera": EVERYTHING.camera, "film": EVERYTHING.film} | changed)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import expn
 
 from oracle.tracer import render
 from reference_scenes import model
@@ -257,6 +258,16 @@ def test_an_irradiance_meter_hides_nothing(show, medium):
 
 
 # -------------------------------------------------------------------------------------------------- medium
+
+
+def test_an_irradiance_meter_stands_in_the_medium(show):
+    fog = model.Medium(absorption=(1.0, 1.0, 1.0), scattering=(0.0, 0.0, 0.0))
+    ceiling = model.Rectangle(center=(0.0, 0.0, 2.0), half_u=(50.0, 0.0, 0.0), half_v=(0.0, -50.0, 0.0))
+    scene = model.Scene(
+        emitters=(lamp(ceiling, (1.0, 1.0, 1.0)),), medium=fog, camera=METER, film=model.Film(width=16, height=16)
+    )
+    # A ceiling without end, 1 m above: 2 pi times the integral of mu exp(-1/mu); the rest is behind 49 m of fog.
+    assert show(scene, 1024).mean() == pytest.approx(2 * np.pi * expn(3, 1.0), rel=0.01)
 
 
 @pytest.mark.parametrize("absorption", [(0.5, 0.5, 0.5), (0.0, 0.5, 3.0)], ids=["grey", "coloured"])

@@ -49,15 +49,13 @@ def add_sensor(root: Element, scene: model.Scene) -> None:
             SubElement(transform, "scale", x=repr(camera.width / 2), y=repr(camera.width / 2))
             look_at(transform, camera.origin, camera.target, camera.up)
         case model.IrradianceMeter():
+            _require_found_by_chance(scene)
             shape = SubElement(root, "shape", type="rectangle")
             u, v = np.array(camera.surface.half_u), np.array(camera.surface.half_v)
             normal = np.cross(u, v) / (np.linalg.norm(u) * np.linalg.norm(v))
             # Mitsuba's rows go along the second axis.
             add_matrix(shape, u, -v, normal, np.array(camera.surface.center))
             SubElement(shape, "bsdf", type="null")
-            if scene.medium is not None:
-                for side in ("interior", "exterior"):
-                    SubElement(shape, "ref", name=side, id="medium")
             sensor = SubElement(shape, "sensor", type="irradiancemeter")
         case model.RadianceMeter():
             if (scene.film.width, scene.film.height) != (1, 1):
@@ -65,9 +63,18 @@ def add_sensor(root: Element, scene: model.Scene) -> None:
             sensor = SubElement(root, "sensor", type="radiancemeter")
             add_point(sensor, "point", "origin", camera.origin)
             add_point(sensor, "vector", "direction", camera.direction)
-    if scene.medium is not None and not isinstance(camera, model.IrradianceMeter):
+    if scene.medium is not None:
         SubElement(sensor, "ref", id="medium")
     _film(sensor, scene.film)
+
+
+def _require_found_by_chance(scene: model.Scene) -> None:
+    for index, emitter in enumerate(scene.emitters):
+        if isinstance(emitter, model.PointEmitter | model.SpotEmitter | model.DirectionalEmitter):
+            raise CannotExport(
+                f"/emitters/{index}/type",
+                f"mitsuba3's irradiance meters do not see {emitter.type} emitters; take a small area emitter",
+            )
 
 
 def _clip(sensor: Element, camera: model.Camera | model.OrthographicCamera) -> None:
