@@ -52,8 +52,9 @@ def test_the_readme_s_submission_is_valid():
     validate(tomllib.loads(example[1]), CommandSubmission, "README.md")
 
 
-def test_what_is_typed_into_python_gives_what_the_page_says():
-    finished = doctest.testfile(str(ROOT / "docs" / "light.md"), module_relative=False)
+@pytest.mark.parametrize("page", ["light.md", "tracer.md"])
+def test_what_is_typed_into_python_gives_what_the_page_says(page):
+    finished = doctest.testfile(str(ROOT / "docs" / page), module_relative=False)
     assert finished.attempted >= 3
     assert not finished.failed
 

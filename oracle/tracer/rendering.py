@@ -26,6 +26,8 @@ Sampler: TypeAlias = Literal["sobol", "independent"]
 
 # Samples of the Sobol' kind are not independent of each other; the variance comes from so many independent parts.
 REPLICATES = 8
+# Samples are followed eight at a time; whole groups of them make it irrelevant how they come together.
+GROUP = 8
 _UNBOUNDED = 1 << 30
 _SUM_UNIT, _SQUARE_UNIT = 2.0**-64, 2.0**-60
 # A pass is no longer than this, so that an interrupted rendering loses little.
@@ -250,27 +252,23 @@ class Job:
         InvalidArgument
             If `start` shows something else, or a number is out of its range.
         """
-        parts = self.method.replicates
         if not 0 <= seed < 1 << 64:
             raise InvalidArgument(f"seed is {seed}, it must be between 0 and 2**64 - 1")
         for name, value in (("spp", goal.spp or 0), ("first_sample", first_sample)):
-            if value % parts or not 0 <= value < 1 << 32:
-                multiple = (
-                    f"a multiple of {parts} (independent sequences of Sobol' points)" if parts > 1 else "an integer"
-                )
-                raise InvalidArgument(f"{name} is {value}, it must be {multiple} and below 2**32")
+            if value % GROUP or not 0 <= value < 1 << 32:
+                raise InvalidArgument(f"{name} is {value}, it must be a multiple of {GROUP} and below 2**32")
         rendering = self.nothing() if start is None else start
         if rendering.identity != self.identity:
             raise InvalidArgument("start: shows another scene, or was rendered otherwise")
         at = max([first_sample, *(one.first + one.count for one in rendering.ranges if one.seed == seed)])
         began = time.monotonic()
-        count = 2 * parts
+        count = 2 * GROUP
         while True:
             missing = goal.samples(rendering) - rendering.spp
             elapsed = time.monotonic() - began
             if missing <= 0 or (goal.seconds is not None and elapsed >= goal.seconds):
                 return
-            count = min(count, parts * math.ceil(min(missing, 1 << 40) / parts), (1 << 32) - at)
+            count = min(count, GROUP * math.ceil(min(missing, 1 << 40) / GROUP), (1 << 32) - at)
             if count <= 0:
                 raise InvalidArgument("spp: a seed has no more than 2**32 samples; go on with another one")
             expected = goal.samples(rendering) if goal.seconds is None else math.inf
@@ -284,13 +282,13 @@ class Job:
             yield rendering
             at += count
             took = time.monotonic() - began - elapsed
-            count = rendering.spp if 2 * took * rendering.spp / count < _PASS_SECONDS else _shorter(count, took, parts)
+            count = rendering.spp if 2 * took * rendering.spp / count < _PASS_SECONDS else _shorter(count, took)
 
 
-def _shorter(count: int, took: float, parts: int) -> int:
-    """The number of samples that takes about as long as a pass should, a power of two times `parts`."""
-    fitting = count * _PASS_SECONDS / max(took, 1e-9) / parts
-    return parts << max(0, math.floor(math.log2(max(fitting, 1.0))))
+def _shorter(count: int, took: float) -> int:
+    """The number of samples that takes about as long as a pass should, a power of two times a group."""
+    fitting = count * _PASS_SECONDS / max(took, 1e-9) / GROUP
+    return GROUP << max(0, math.floor(math.log2(max(fitting, 1.0))))
 
 
 @dataclass(frozen=True)
@@ -323,7 +321,7 @@ def render(
     scene, sensor, film
         What is seen, by whom, in how many pixels.
     spp : int
-        Samples per pixel; of Sobol' points a multiple of 8, best 8 times a power of two.
+        Samples per pixel, a multiple of 8; Sobol' points are best in 8 times a power of two.
     seed : int
         Renderings with different seeds are independent of each other. From 0 to 2**64 - 1.
     threads : int
