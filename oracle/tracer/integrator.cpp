@@ -39,7 +39,7 @@ struct Vertex {
     enum class Kind { surface, medium, meter };
     Kind kind;
     Vec3 p, normal;
-    float distance;  // that the ray came from, which tells how far rounding may have moved p
+    float reach;     // of the numbers behind p, which tells how far rounding may have moved it
     Frame frame;     // shading frame; in a medium, z is where the path came from
     Bsdf bsdf;
     Vec3 to_eye;     // local
@@ -88,7 +88,7 @@ struct Vertex {
     }
 
     Vec3 leave(const Vec3& direction) const {
-        return kind == Kind::medium ? p : off_surface(p, normal, direction, distance);
+        return kind == Kind::medium ? p : off_surface(p, normal, direction, reach);
     }
 };
 
@@ -130,8 +130,10 @@ Connection sample_direct(const Scene& scene, const Vertex& vertex, Strategy stra
     if (scene.has_medium) result.light *= transmittance(scene, s.distance);
     // From beside the one surface to beside the other.
     if (std::isfinite(s.distance)) {
-        const Vec3 d = off_surface(s.point, s.normal, s.normal, s.distance) - result.from;
-        const float distance = length(d);
+        const float reach = std::max(s.distance, scene.lights[size_t(chosen)].extent);
+        const Vec3 d = off_surface(s.point, s.normal, s.normal, reach) - result.from;
+        // Between ends that coincide there is nothing.
+        const float distance = std::max(length(d), std::numeric_limits<float>::min());
         result.direction = d / distance;
         result.distance = distance * (1 - 2e-7f);
     }
@@ -274,7 +276,8 @@ bool arrive(const Scene& scene, const Method& method, Path& path, bool hit, Surf
         if (!front) s.shading = -s.shading;
     }
     const Frame frame(s.shading);
-    const Vertex vertex{Vertex::Kind::surface, s.p, s.normal, s.distance, frame, scene.bsdf(s, material), frame.to_local(back)};
+    const float reach = std::max(s.distance, s.extent);
+    const Vertex vertex{Vertex::Kind::surface, s.p, s.normal, reach, frame, scene.bsdf(s, material), frame.to_local(back)};
     return scatter(scene, method, path, vertex, draw, connection);
 }
 

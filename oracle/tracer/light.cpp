@@ -16,36 +16,44 @@ bool is_near(const Light& l, const Vec3& from) {
 
 // A rectangle as seen from a point, in the coordinates of its edges (Ureña, Fajardo and King 2013).
 struct SphericalRectangle {
-    Vec3 x, y, z;                // unit vectors along the edges, and away from the rectangle's plane
-    float x0, y0, z0, x1, y1;    // corners, z0 < 0
+    float x0, y0, x1, y1, z;  // corners; z > 0 is the distance of the plane
     float b0, b1, k, solid_angle;
 
     SphericalRectangle(const Light& l, const Vec3& from) {
         const float width = length(l.u), height = length(l.v);
-        x = l.u / width, y = l.v / height, z = cross(x, y);
         const Vec3 d = l.p - from;
-        x0 = dot(d, x), y0 = dot(d, y), z0 = dot(d, z);
-        if (z0 > 0) z = -z, z0 = -z0;
+        x0 = dot(d, l.u) / width, y0 = dot(d, l.v) / height, z = std::fabs(dot(d, l.n));
         x1 = x0 + width, y1 = y0 + height;
-        // Normals of the planes through the eye and each edge; the angles between them.
-        const auto normal = [](float a, float b) { return a / std::sqrt(a * a + b * b); };
-        const float n0 = normal(-y0, z0), n1 = normal(x1, z0), n2 = normal(y1, z0), n3 = normal(-x0, z0);
-        const float g0 = std::acos(-n0 * n1), g1 = std::acos(-n1 * n2), g2 = std::acos(-n2 * n3), g3 = std::acos(-n3 * n0);
-        b0 = n0, b1 = n2;
-        k = 2 * pi - g2 - g3;
-        solid_angle = g0 + g1 - k;
+        // The planes through the eye and each edge enclose these angles. Their sines come from the corners' distances, for
+        // an arc cosine would lose the digits of angles near 0 and pi, which is what they are near the rectangle's plane.
+        const auto over = [&](float a) { return 1 / std::sqrt(a * a + z * z); };
+        const float u0 = over(x0), u1 = over(x1), v0 = over(y0), v1 = over(y1);
+        const auto angle = [&](float x, float y, float u, float v, float sign) {
+            return Vec2{sign * (x * u) * (y * v), z * u * v * std::sqrt(x * x + y * y + z * z)};
+        };
+        const auto sum = [](const Vec2& a, const Vec2& b) { return Vec2{a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x}; };
+        const auto radians = [](const Vec2& a) {
+            const float r = std::atan2(a.y, a.x);
+            return r < 0 ? r + 2 * pi : r;
+        };
+        const Vec2 right = sum(angle(x1, y0, u1, v0, 1), angle(x1, y1, u1, v1, -1));
+        const Vec2 left = sum(angle(x0, y1, u0, v1, 1), angle(x0, y0, u0, v0, -1));
+        b0 = -y0 * v0, b1 = y1 * v1;
+        k = 2 * pi - radians(left);
+        solid_angle = radians(sum(right, left));
     }
 
-    Vec3 sample(const Vec2& u) const {
+    // As fractions of the edges.
+    Vec2 sample(const Vec2& u) const {
         const float au = u.x * solid_angle + k;
         const float fu = (std::cos(au) * b0 - b1) / std::sin(au);
         const float cu = std::clamp(std::copysign(1 / std::sqrt(fu * fu + b0 * b0), fu), -1.0f, 1.0f);
-        const float xu = std::clamp(-(cu * z0) / safe_sqrt(1 - cu * cu), x0, x1);
-        const float d2 = xu * xu + z0 * z0;
+        const float x = std::clamp(cu * z / safe_sqrt(1 - cu * cu), x0, x1);
+        const float d2 = x * x + z * z;
         const float h0 = y0 / std::sqrt(d2 + y0 * y0), h1 = y1 / std::sqrt(d2 + y1 * y1);
         const float h = h0 + u.y * (h1 - h0);
-        const float yv = h * h < 1 - 1e-6f ? h * std::sqrt(d2) / std::sqrt(1 - h * h) : y1;
-        return xu * x + yv * y + z0 * z;
+        const float y = h * h < 1 - 1e-6f ? std::clamp(h * std::sqrt(d2) / std::sqrt(1 - h * h), y0, y1) : y1;
+        return {(x - x0) / (x1 - x0), (y - y0) / (y1 - y0)};
     }
 };
 
@@ -54,13 +62,15 @@ struct SphericalTriangle {
     Vec3 a, b, c;
     float solid_angle, alpha;
 
-    SphericalTriangle(const Light& l, const Vec3& from)
-        : a(normalize(l.p - from)), b(normalize(l.p + l.u - from)), c(normalize(l.p + l.v - from)) {
-        // van Oosterom and Strackee 1983.
-        const float triple = std::fabs(dot(a, cross(b, c)));
+    SphericalTriangle(const Light& l, const Vec3& from) {
+        const Vec3 d = l.p - from, e = d + l.u, f = d + l.v;
+        const float da = length(d), db = length(e), dc = length(f);
+        a = d / da, b = e / db, c = f / dc;
+        // van Oosterom and Strackee 1983; the triple product by the distance of the plane, which does not cancel.
+        const float triple = 2 * l.area * std::fabs(dot(d, l.n)) / (da * db * dc);
         solid_angle = 2 * std::atan2(triple, 1 + dot(a, b) + dot(b, c) + dot(c, a));
         const Vec3 ab = cross(a, b), ac = cross(a, c);
-        alpha = std::atan2(length(cross(ab, ac)), dot(ab, ac));
+        alpha = std::atan2(triple, dot(ab, ac));
     }
 
     Vec3 sample(const Vec2& u) const {
@@ -142,10 +152,8 @@ LightSample sample_light(const Light& l, const std::vector<Texture>& textures, c
             if (is_near(l, from)) {
                 const SphericalRectangle seen(l, from);
                 if (!(seen.solid_angle > 0)) return {};
-                const Vec3 point = from + seen.sample(u);
-                const Vec3 d = point - l.p;
-                const Color radiance = emitted(l, textures, dot(d, l.u) / length_squared(l.u), dot(d, l.v) / length_squared(l.v));
-                return towards(l, from, point, l.n, radiance, 1 / seen.solid_angle);
+                const Vec2 at = seen.sample(u);
+                return towards(l, from, l.p + at.x * l.u + at.y * l.v, l.n, emitted(l, textures, at.x, at.y), 1 / seen.solid_angle);
             }
             return towards(l, from, l.p + u.x * l.u + u.y * l.v, l.n, emitted(l, textures, u.x, u.y));
         }
@@ -158,9 +166,10 @@ LightSample sample_light(const Light& l, const std::vector<Texture>& textures, c
                 const float cosine = dot(w, l.n);
                 const float t = cosine == 0 ? 0 : dot(l.p - from, l.n) / cosine;
                 if (!(t > 0)) return {};
-                const Vec3 point = from + t * w, d = point - l.p, c = cross(l.u, l.v);
+                // By its fractions of the edges, so that rounding does not move it off the plane.
+                const Vec3 d = from + t * w - l.p, c = cross(l.u, l.v);
                 const float s = dot(cross(d, l.v), c) / dot(c, c), q = dot(cross(l.u, d), c) / dot(c, c);
-                return towards(l, from, point, l.n, emitted(l, textures, s, q), 1 / seen.solid_angle);
+                return towards(l, from, l.p + s * l.u + q * l.v, l.n, emitted(l, textures, s, q), 1 / seen.solid_angle);
             }
             // Uniform in the triangle (Heitz 2019, "A Low-Distortion Map Between Triangle and Square").
             float s, t;

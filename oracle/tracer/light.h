@@ -15,6 +15,7 @@ struct Light {
     Vec3 n{};          // unit normal of the front, or where a spot or parallel light shines
     float radius = 0;  // of a disk or sphere
     float area = 0;
+    float extent = 0;  // longest edge or radius, by whose rounding points on it are off
     Vec3 center{};     // of whatever has a surface
     float brightness = 0;  // mean of `light` over the channels
     float full = 0, cutoff = 0;  // half angles of a spot

@@ -32,6 +32,21 @@ RTCRay make_ray(const Vec3& o, const Vec3& d, float t_far) {
     return ray;
 }
 
+float longest_edge(const Mesh& mesh) {
+    float longest2 = 0;
+    for (const Triangle& t : mesh.triangles) {
+        const Vec3 &a = mesh.vertices[t.a], &b = mesh.vertices[t.b], &c = mesh.vertices[t.c];
+        longest2 = std::max({longest2, length_squared(b - a), length_squared(c - b), length_squared(a - c)});
+    }
+    return std::sqrt(longest2);
+}
+
+// By how much the map lengthens edges, at most.
+float stretch(const Affine& m) {
+    return std::sqrt(squared(m[0]) + squared(m[1]) + squared(m[2]) + squared(m[4]) + squared(m[5]) + squared(m[6]) +
+                     squared(m[8]) + squared(m[9]) + squared(m[10]));
+}
+
 // The k-th of eight rays.
 template <typename Rays>
 void set_ray(Rays& rays, int k, const Vec3& o, const Vec3& d, float t_far) {
@@ -184,6 +199,7 @@ void Scene::add_mesh(int object, Mesh mesh) {
         add_flat(mesh.vertices[t.a], mesh.vertices[t.b], mesh.vertices[t.c], false, i);
     }
     Geometry description{Kind::mesh, uint32_t(object)};
+    description.extent = longest_edge(mesh);
     add_area_lights(object, description, &mesh);
     // Corners are Embree's business; what is kept is looked up at hits.
     if (!mesh.normals.empty() || !mesh.uv.empty()) {
@@ -206,6 +222,7 @@ void Scene::add_rectangle(int object, const Vec3& corner, const Vec3& u, const V
     for (uint32_t i = 0; i < 4; ++i) indices[i] = i;
     Geometry description{Kind::rectangle, uint32_t(object)};
     description.center = corner, description.u = u, description.v = v, description.normal = normalize(cross(u, v));
+    description.extent = std::max(length(u), length(v));
     add_area_lights(object, description, nullptr);
     is_small_ &= few_.size() < Few::most;
     if (is_small_) add_flat(corners[0], corners[1], corners[3], true, 0);
@@ -220,14 +237,15 @@ void Scene::add_flat(const Vec3& a, const Vec3& b, const Vec3& c, bool parallelo
 
 void Scene::add_disk(int object, const Vec3& center, const Vec3& normal, float radius) {
     Geometry description{Kind::disk, uint32_t(object)};
-    description.center = center, description.normal = normalize(normal), description.radius = radius;
+    description.center = center, description.normal = normalize(normal);
+    description.radius = description.extent = radius;
     add_area_lights(object, description, nullptr);
     attach(Owned<RTCGeometry>(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_USER)).get(), description);
 }
 
 void Scene::add_sphere(int object, const Vec3& center, float radius) {
     Geometry description{Kind::sphere, uint32_t(object)};
-    description.center = center, description.radius = radius;
+    description.center = center, description.radius = description.extent = radius;
     add_area_lights(object, description, nullptr);
     attach(Owned<RTCGeometry>(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_USER)).get(), description);
 }
@@ -243,6 +261,7 @@ void Scene::add_instances(int object, Mesh mesh, const std::vector<Affine>& tran
     rtcCommitScene(prototype);
     check("build an instanced mesh");
     Geometry description{Kind::instance, uint32_t(object)};
+    const float longest = longest_edge(mesh);
     if (!mesh.normals.empty() || !mesh.uv.empty()) {
         mesh.vertices = {};
         meshes_.push_back(std::make_unique<Mesh>(std::move(mesh)));
@@ -254,6 +273,7 @@ void Scene::add_instances(int object, Mesh mesh, const std::vector<Affine>& tran
         rtcSetGeometryInstancedScene(instance.get(), prototype);
         rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, transform.data());
         description.transform = transform;
+        description.extent = longest * stretch(transform);
         attach(instance.get(), description);
     }
 }
@@ -264,6 +284,7 @@ void Scene::add_area_lights(int object, const Geometry& g, const Mesh* mesh) {
     owner.first_light = int(lights.size());
     Light light{};
     light.radiance = owner.radiance;
+    light.extent = g.extent;
     light.light = owner.radiance.texture < 0 ? owner.radiance.constant : textures[size_t(owner.radiance.texture)].average();
     light.two_sided = owner.two_sided;
     switch (g.kind) {
@@ -429,6 +450,7 @@ void Scene::describe(const Ray& ray, const Hit& hit, Surface& s) const {
     s.distance = hit.distance;
     s.p = ray.origin + s.distance * ray.direction;
     s.object = g.object;
+    s.extent = g.extent;
     s.primitive = hit.primitive;
     s.material = objects[g.object].material;
     switch (g.kind) {

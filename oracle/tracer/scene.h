@@ -46,6 +46,7 @@ struct Surface {
     Vec3 shading;  // interpolated, of the front
     Vec2 uv;
     float distance;
+    float extent;  // of the shape, as for a light
     uint32_t object, primitive;
     int material;  // -1 is black
 };
@@ -118,6 +119,7 @@ private:
         int mesh = -1;  // whose normals and texture coordinates to look up
         Vec3 center{}, u{}, v{}, normal{};
         float radius = 0;
+        float extent = 0;  // longest edge or radius
         Affine transform{};
     };
     friend struct UserGeometry;
