@@ -15,8 +15,8 @@ from oracle.chunks import chunks
 
 # A part that still fails after so many halvings is as small as its corner's rounding.
 _DEEPEST = 40
-# With so many parts that fail the quadrature ends, and what is not known goes into the bound.
-_MOST = 1 << 18
+# After so many parts the quadrature ends, and what is not known goes into the bound.
+_MOST = 1 << 20
 # So many parts are evaluated at once, each in 136 places.
 _AT_ONCE = 4096
 # Gauss points along each side: the difference of the two rules tells how good they are.
@@ -46,7 +46,7 @@ def integrate(
     dimensions : int
         2, or 1 for unit intervals in place of squares.
     most : int
-        Squares that may be quartered at once; with more it ends.
+        After so many squares it ends, whatever the bound is then.
 
     Returns
     -------
@@ -58,15 +58,17 @@ def integrate(
     value, error = np.zeros(count), np.zeros(count)
     index = np.arange(len(owner))
     corner, size = np.zeros((len(index), dimensions)), 1.0
+    evaluated = 0
     for depth in range(_DEEPEST + 1):
         if not len(index):
             break
+        evaluated += len(index)
         coarse, fine, noise = _evaluated(integrand, index, corner, size)
         difference = np.abs(fine - coarse)
         # Squares may cancel one another: what counts is how much there is of either sign.
         total = np.bincount(owner[index], np.abs(fine), count) + np.abs(value)
         done: Booleans = difference <= tolerance * total[owner[index]] + noise
-        if depth == _DEEPEST or np.count_nonzero(~done) > most:
+        if depth == _DEEPEST or evaluated + np.count_nonzero(~done) * 2**dimensions > most:
             done = np.ones_like(done)
         value += np.bincount(owner[index[done]], fine[done], count)
         error += np.bincount(owner[index[done]], (difference + noise)[done], count)

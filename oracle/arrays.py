@@ -12,6 +12,11 @@ Integers: TypeAlias = NDArray[np.int64]
 Booleans: TypeAlias = NDArray[np.bool_]
 
 
+# Coordinates and lengths [m] are at most 1e18, lengths of shapes at least 1e-18, and amounts of light at most 1e36, in
+# whatever unit: products of all that formulas multiply stay within float64.
+LARGEST, SMALLEST, BRIGHTEST = 1e18, 1e-18, 1e36
+
+
 class InvalidArgument(ValueError):
     """An argument that no light can have; the message names it, its index and the reason."""
 
@@ -32,18 +37,33 @@ def finite(name: str, value: ArrayLike, trailing: tuple[int, ...] = ()) -> Float
     return array
 
 
+def position(name: str, value: ArrayLike, trailing: tuple[int, ...] = (3,)) -> Floats:
+    """Like `finite`, for coordinates [m]: none beyond `LARGEST`."""
+    array = finite(name, value, trailing)
+    _refuse(name, array, np.abs(array) > LARGEST, f"is {{}}, coordinates lie within {LARGEST:g} m")
+    return array
+
+
 def vector(name: str, value: ArrayLike) -> Floats:
-    """Like `finite`, for a single vector of shape (3,)."""
-    array = finite(name, value)
+    """Like `position`, for a single vector of shape (3,)."""
+    array = position(name, value, ())
     if array.shape != (3,):
         raise InvalidArgument(f"{name} has shape {array.shape}, it must be (3,)")
     return array
 
 
 def light(name: str, value: ArrayLike) -> Floats:
-    """Like `finite`, for a quantity of light of any shape: at least 0."""
+    """Like `finite`, for a quantity of light of any shape: at least 0, at most `BRIGHTEST`."""
     array = finite(name, value)
     _refuse(name, array, array < 0, "is {}, light is at least 0")
+    _refuse(name, array, array > BRIGHTEST, f"is {{}}, light is at most {BRIGHTEST:g}")
+    return array
+
+
+def way(name: str, value: ArrayLike) -> Floats:
+    """Like `position`, for distances [m] of any shape: at least 0."""
+    array = position(name, value, ())
+    _refuse(name, array, array < 0, "is {}, a distance is at least 0")
     return array
 
 
@@ -56,7 +76,7 @@ def spectrum(name: str, value: ArrayLike) -> Floats:
 
 
 def length(name: str, value: float) -> float:
-    """Return `value` as a positive, finite float.
+    """Return `value` as a float; it has to be positive, and a length [m] between `SMALLEST` and `LARGEST`.
 
     Raises
     ------
@@ -68,7 +88,14 @@ def length(name: str, value: float) -> float:
         raise InvalidArgument(f"{name} has shape {number.shape}, it must be a single number")
     if number <= 0:
         raise InvalidArgument(f"{name} is {number}, it must be positive")
+    demand_size(name, float(number))
     return float(number)
+
+
+def demand_size(name: str, size: float) -> None:
+    """Raise `InvalidArgument` if a size [m] is neither between `SMALLEST` and `LARGEST` nor 0."""
+    if 0 < size < SMALLEST or size > LARGEST:
+        raise InvalidArgument(f"{name} is {size:.7g} m, lengths lie between {SMALLEST:g} and {LARGEST:g} m")
 
 
 def indices(name: str, value: ArrayLike, count: int) -> Integers:

@@ -1,6 +1,7 @@
 """Emitters and receivers as frozen data: where light leaves and arrives, in SI units.
 
-``C`` is the number of colour channels; arrays are float64 and read-only.
+``C`` is the number of colour channels; arrays are float64 and read-only. Coordinates lie within 1e18 m, and light, in
+whatever unit, is at most 1e36.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from oracle.arrays import Floats, InvalidArgument, direction, finite, light, replace, spectrum, vector
+from oracle.arrays import Floats, InvalidArgument, demand_size, direction, light, position, replace, spectrum, vector
 from oracle.shapes import Shape
 
 
@@ -22,7 +23,7 @@ class Receivers:
     normals: Floats
 
     def __post_init__(self) -> None:
-        points, normals = finite("points", self.points, (3,)), direction("normals", self.normals)
+        points, normals = position("points", self.points), direction("normals", self.normals)
         try:
             shape = np.broadcast_shapes(points.shape, normals.shape)
         except ValueError:
@@ -114,6 +115,7 @@ class Line:
         )
         if (self.start == self.end).all():
             raise InvalidArgument("start and end are the same point")
+        demand_size("the length from start to end", float(np.abs(self.end - self.start).max()))
 
 
 @dataclass(frozen=True, eq=False)

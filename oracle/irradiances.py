@@ -51,8 +51,8 @@ def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers, occlu
     Raises
     ------
     InvalidArgument
-        If there is no emitter, one is of another type, their numbers of channels differ, or no closed form is known
-        for an emitter past these occluders.
+        If there is no emitter, one is of another type, their numbers of channels differ, no closed form is known for
+        an emitter past these occluders, or a receiver is on a point, spot or line, where irradiance is infinite.
 
     Notes
     -----
@@ -77,7 +77,10 @@ def irradiance(emitter: Emitter | Sequence[Emitter], receivers: Receivers, occlu
     parts = [simple for one in together for simple in _parts(one)]
     for part in chunks(receivers.shape):
         points, normals = receivers.points[part].reshape(-1, 3), receivers.normals[part].reshape(-1, 3)
-        here = reduce(add, (_of_one(one, points, normals) for one in parts))
+        try:
+            here = reduce(add, (_of_one(one, points, normals) for one in parts))
+        except point_like.OnEmitter as error:
+            raise error.within(receivers.shape, part) from None
         result.value[part] = here.value.reshape(result.value[part].shape)
         result.error[part] = here.error.reshape(result.error[part].shape)
     return result

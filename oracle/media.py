@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from oracle.arrays import Floats, InvalidArgument, direction, dot, finite, light, replace, spectrum, vector
+from oracle.arrays import Floats, InvalidArgument, direction, dot, position, replace, spectrum, vector, way
 from oracle.bounded import Bounded
 from oracle.chunks import chunks
 from oracle.emitters import Directional, Point, Receivers
@@ -65,8 +65,8 @@ class Rays:
     lengths: Floats
 
     def __post_init__(self) -> None:
-        origins, directions = finite("origins", self.origins, (3,)), direction("directions", self.directions)
-        lengths = light("lengths", self.lengths)
+        origins, directions = position("origins", self.origins), direction("directions", self.directions)
+        lengths = way("lengths", self.lengths)
         try:
             shape = np.broadcast_shapes(origins.shape[:-1], directions.shape[:-1], lengths.shape)
         except ValueError:
@@ -118,7 +118,7 @@ def transmittance(extinction: ArrayLike, distance: ArrayLike) -> Bounded:
     -----
     ``exp(-sigma_t d)`` [Bouguer 1729; Lambert 1760; Beer 1852].
     """
-    depth = light("distance", distance)[..., None] * spectrum("extinction", extinction)
+    depth = way("distance", distance)[..., None] * spectrum("extinction", extinction)
     value = np.exp(-depth)
     return Bounded(value, _EPSILON * (2 + depth) * value + np.finfo(np.float64).smallest_subnormal * (depth > 700))
 

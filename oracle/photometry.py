@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from oracle.arrays import Floats, InvalidArgument, finite
-from oracle.arrays import length as positive
 from oracle.radiometry import PHOTOMETRIC, RADIOMETRIC, Measure, Quantity
 from oracle.spectra import Spectrum, photopic_efficiency, rgb_space
 
@@ -95,10 +94,12 @@ def _weighed(spectrum: Spectrum) -> float:
 
 
 def _checked(efficacy: float) -> float:
-    number = positive("efficacy", efficacy)
-    if number > LUMINOUS_EFFICACY:
-        raise InvalidArgument(f"efficacy is {number} lm/W, more than the {LUMINOUS_EFFICACY:g} of light at 555 nm")
-    return number
+    number = finite("efficacy", efficacy)
+    if number.ndim or not 0 < number <= LUMINOUS_EFFICACY:
+        raise InvalidArgument(
+            f"efficacy is {efficacy} lm/W; it must be a number from 0 to {LUMINOUS_EFFICACY:g}, excluding 0"
+        )
+    return float(number)
 
 
 def _converted(measure: Measure, factor: float, given: tuple[Quantity, ...], wanted: tuple[Quantity, ...]) -> Measure:

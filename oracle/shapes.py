@@ -1,4 +1,7 @@
-"""Shapes as frozen data: what can shine, hide or receive. Lengths in metres; arrays are float64 and read-only."""
+"""Shapes as frozen data: what can shine, hide or receive.
+
+Arrays are float64 and read-only. Coordinates lie within 1e18 m, sizes between 1e-18 and 1e18 m.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,19 @@ from typing import TypeAlias
 
 import numpy as np
 
-from oracle.arrays import Floats, Integers, InvalidArgument, direction, finite, indices, length, replace, vector
+from oracle.arrays import (
+    Floats,
+    Integers,
+    InvalidArgument,
+    demand_size,
+    direction,
+    finite,
+    indices,
+    length,
+    position,
+    replace,
+    vector,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,12 +35,13 @@ class Polygon:
     vertices: Floats
 
     def __post_init__(self) -> None:
-        vertices = finite("vertices", self.vertices, (3,))
+        vertices = position("vertices", self.vertices)
         if vertices.ndim != 2 or len(vertices) < 3:
             raise InvalidArgument(f"vertices has shape {vertices.shape}, a polygon needs (N, 3) with N >= 3")
         replace(self, vertices=vertices)
         relative = vertices - vertices[0]
         size = float(np.abs(relative).max())
+        demand_size("the extent of vertices", size)
         if np.linalg.norm(self._doubled_area()) <= 1e-14 * size**2:
             raise InvalidArgument("vertices enclose no area")
         off_plane = np.abs(relative @ self.normal)
@@ -80,6 +96,7 @@ class Rectangle:
         for name, half in zip(("half_u", "half_v"), lengths, strict=True):
             if half == 0:
                 raise InvalidArgument(f"{name} has no length, so that the rectangle has no area")
+            demand_size(f"the length of {name}", float(half))
         if abs(u @ v) > 1e-9 * lengths[0] * lengths[1]:
             raise InvalidArgument("half_u and half_v are not orthogonal; use a Polygon for a parallelogram")
 
@@ -142,8 +159,8 @@ class Sphere:
 class Mesh:
     """Triangles, each with its front on the side from which its corners go round counter-clockwise.
 
-    Vertices [m], shape (V, 3), and indices into them, shape (M, 3). `normals`, shape (V, 3), bend the directions in which
-    renderers shade it, and `uv`, shape (V, 2), places textures on it; closed forms need neither.
+    Vertices [m], shape (V, 3), and indices into them, shape (M, 3). `normals`, shape (V, 3), bend the directions in
+    which renderers shade it, and `uv`, shape (V, 2), places textures on it; closed forms need neither.
     """
 
     vertices: Floats
@@ -152,7 +169,7 @@ class Mesh:
     uv: Floats | None = None
 
     def __post_init__(self) -> None:
-        vertices = finite("vertices", self.vertices, (3,))
+        vertices = position("vertices", self.vertices)
         if vertices.ndim != 2 or len(vertices) < 3:
             raise InvalidArgument(f"vertices has shape {vertices.shape}, a mesh needs (V, 3) with V >= 3")
         triangles = indices("triangles", self.triangles, len(vertices))
@@ -160,6 +177,8 @@ class Mesh:
         a, b, c = (vertices[triangles[:, i]] for i in range(3))
         b, c = b - a, c - a
         size = np.maximum(np.abs(b), np.abs(c)).max(axis=1)
+        for index in (int(size.argmin()), int(size.argmax())):
+            demand_size(f"the extent of triangles[{index}]", float(size[index]))
         flat = np.flatnonzero(np.linalg.norm(np.cross(b, c), axis=1) <= 1e-14 * size**2)
         if flat.size:
             raise InvalidArgument(f"triangles[{flat[0]}] {triangles[flat[0]].tolist()}: vertices enclose no area")

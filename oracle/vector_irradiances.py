@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from oracle.arrays import Floats, InvalidArgument, finite
+from oracle.arrays import Floats, InvalidArgument, position
 from oracle.bounded import Bounded
 from oracle.chunks import chunks
 from oracle.emitters import (
@@ -77,7 +77,7 @@ def vector_irradiance(emitter: Emitter | Sequence[Emitter], points: ArrayLike) -
     for index, count in enumerate(channels):
         if count != channels[0]:
             raise InvalidArgument(f"emitter[{index}] has {count} channels, emitter[0] has {channels[0]}")
-    places = finite("points", points, (3,))
+    places = position("points", points)
     leading = places.shape[:-1]
     result = Bounded(np.empty((*leading, 3, channels[0])), np.empty((*leading, 3, channels[0])))
     for part in chunks(leading):

@@ -39,7 +39,7 @@ def test_way_through_two_slabs_is_the_product():
 
 
 def test_vacuum_lets_everything_pass():
-    assert (media.transmittance([0.0, 0.0], [0.0, 1e300]).value == 1).all()
+    assert (media.transmittance([0.0, 0.0], [0.0, 1e18]).value == 1).all()
     receivers = Receivers([0.0, 0.0, 0.0], [0.0, 0.0, -1.0])
     vacuum = media.Medium([0.0, 0.0], [0.0, 0.0])
     assert media.point_irradiance(LAMP, receivers, vacuum).value == pytest.approx(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from oracle.arrays import Booleans, Floats, InvalidArgument, direction, finite, vector
+from oracle.arrays import Booleans, Floats, InvalidArgument, demand_size, direction, finite, position, vector
 from oracle.arrays import dot as plain_dot
 from oracle.bounded import Bounded
 from oracle.chunks import chunks
@@ -51,7 +51,7 @@ def solid_angle(shape: Shape, points: ArrayLike) -> Bounded:
       the disk is further away than three radii.
     - Sphere: ``4 pi sin^2(a/2)`` with ``sin a = R / d``.
     """
-    positions = finite("points", points, (3,))
+    positions = position("points", points)
     shape_of_result = positions.shape[:-1]
     result = Bounded(np.empty(shape_of_result), np.empty(shape_of_result))
     for part in chunks(shape_of_result):
@@ -127,7 +127,8 @@ def plane_angle(start: ArrayLike, end: ArrayLike, points: ArrayLike) -> Bounded:
     a, b = vector("start", start), vector("end", end)
     if (a == b).all():
         raise InvalidArgument("start and end are the same point")
-    positions = finite("points", points, (3,))
+    demand_size("the length from start to end", float(np.abs(b - a).max()))
+    positions = position("points", points)
     result = Bounded(np.empty(positions.shape[:-1]), np.empty(positions.shape[:-1]))
     for part in chunks(positions.shape[:-1]):
         p = positions[part].reshape(-1, 3)
@@ -172,7 +173,7 @@ def solid_angle_to_area(points: ArrayLike, surface_points: ArrayLike, surface_no
 
 
 def _cosine_and_distance(points: ArrayLike, surface_points: ArrayLike, normals: ArrayLike) -> tuple[Floats, Floats]:
-    p, q = finite("points", points, (3,)), finite("surface_points", surface_points, (3,))
+    p, q = position("points", points), position("surface_points", surface_points)
     n = direction("surface_normals", normals)
     try:
         p, q, n = np.broadcast_arrays(p, q, n)

@@ -7,8 +7,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
 
-# Squares and cubes of whatever lies between stay within float64.
-LARGEST, SMALLEST = 1e18, 1e-18
+from oracle.arrays import BRIGHTEST, LARGEST, SMALLEST
 
 
 class Model(BaseModel):
@@ -43,8 +42,8 @@ def _light(value: Any) -> float | tuple[float, ...]:
 def _amount(value: Any) -> float:
     if type(value) not in (int, float):
         raise ValueError("is neither a number nor a list of numbers, one for each channel")
-    if not -LARGEST <= value <= LARGEST:
-        raise ValueError(f"is not finite or above {LARGEST:g}")
+    if not -BRIGHTEST <= value <= BRIGHTEST:
+        raise ValueError(f"is not finite or above {BRIGHTEST:g}")
     if value < 0:
         raise ValueError("is negative; light is at least 0 in every channel")
     return float(value)
@@ -71,7 +70,7 @@ Fraction: TypeAlias = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_
 Cosine: TypeAlias = Annotated[float, Field(strict=True, ge=-1, le=1, allow_inf_nan=False)]
 Index: TypeAlias = Annotated[int, Field(strict=True, ge=0)]
 TwoSided: TypeAlias = Annotated[bool, Field(strict=True, description="whether the back shines or counts as well")]
-Light: TypeAlias = Annotated[float | tuple[float, ...], PlainValidator(_light), _number_or_list(LARGEST)]
+Light: TypeAlias = Annotated[float | tuple[float, ...], PlainValidator(_light), _number_or_list(BRIGHTEST)]
 Reflectance: TypeAlias = Annotated[float | tuple[float, ...], PlainValidator(_reflectance), _number_or_list(1)]
 
 # With units, which the schema and the command line's help show.

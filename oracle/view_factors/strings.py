@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from oracle.arrays import Floats, InvalidArgument, finite
+from oracle.arrays import Floats, InvalidArgument, demand_size, position
 from oracle.bounded import Bounded
 
 _EPSILON = float(np.finfo(np.float64).eps)
@@ -35,10 +35,13 @@ def crossed_strings(source: ArrayLike, target: ArrayLike) -> Bounded:
     Crossed minus uncrossed strings over twice the source's length [Hottel 1954]. Each difference of lengths is that of
     their squares over their sum, so that distant strips keep their digits.
     """
-    a, b = finite("source", source, (2, 2)), finite("target", target, (2, 2))
+    a, b = position("source", source, (2, 2)), position("target", target, (2, 2))
     for name, segment in (("source", a), ("target", b)):
         if (segment[..., 0, :] == segment[..., 1, :]).all(axis=-1).any():
             raise InvalidArgument(f"{name} has a segment without length")
+        demand_size(
+            f"the shortest segment of {name}", float(np.abs(np.diff(segment, axis=-2)).max(axis=(-2, -1)).min())
+        )
     try:
         a, b = np.broadcast_arrays(a, b)
     except ValueError:

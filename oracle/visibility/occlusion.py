@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from oracle import intersection
-from oracle.arrays import Booleans, Floats, InvalidArgument, dot, finite
+from oracle.arrays import Booleans, Floats, InvalidArgument, dot, position
 from oracle.chunks import chunks
 from oracle.emitters import Directional, Point, Spot
 from oracle.shapes import Disk, Mesh, Polygon, Rectangle, Shape, Sphere
@@ -52,7 +52,7 @@ def visible(emitter: Point | Spot | Directional, points: ArrayLike, occluders: S
     for index, occluder in enumerate(occluders):
         if not isinstance(occluder, Shape):
             raise InvalidArgument(f"occluders[{index}] is a {type(occluder).__name__}, not one of oracle.shapes")
-    where = finite("points", points, (3,))
+    where = position("points", points)
     hidden = np.zeros(where.shape[:-1], dtype=np.bool_)
     for part in chunks(hidden.shape):
         p = where[part].reshape(-1, 3)
