@@ -25,7 +25,6 @@ from pydantic import Field, model_validator
 from reference_scenes import model
 from reference_scenes.loading import InvalidFile, load_json, validate
 from reference_scenes.model import Model
-from reference_scenes.model.textures import Texels
 
 if TYPE_CHECKING:
     from oracle.tracer import Rendering
@@ -124,10 +123,10 @@ class About(Model):
 def scene_digest(scene: model.Scene) -> str:
     """A digest of a scene, the same for the same model, whatever file it came from."""
 
-    def short(texels: Texels) -> list[Any]:
-        return [*texels.array.shape, hashlib.sha256(np.ascontiguousarray(texels.array).data).hexdigest()]
+    def short(texels: NDArray[np.float64]) -> list[Any]:
+        return [*texels.shape, hashlib.sha256(np.ascontiguousarray(texels).data).hexdigest()]
 
-    # Texels as they are, which pydantic would warn of: as lists, large textures would need gigabytes.
+    # pydantic leaves texels as they are, and would warn of that; as lists, large textures would need gigabytes.
     data = scene.model_dump(warnings=False)
     return hashlib.sha256(json.dumps(data, default=short).encode()).hexdigest()
 

@@ -30,7 +30,7 @@ from graders.errors import InfrastructureError, UsageError
 from graders.rubric import load_rubric
 from oracle.arrays import InvalidArgument
 from oracle.tracer import Goal, IrradianceMeter, Method, merge
-from oracle.tracer.rendering import Sampler, Strategy
+from oracle.tracer.rendering import GROUP, Sampler, Strategy
 from reference_scenes.families import FAMILIES
 from reference_scenes.loading import InvalidFile, load_scene, suggest
 from reference_scenes.references import IMAGE, About, is_reference, joined, read_state, write_reference
@@ -212,11 +212,9 @@ def _goal(request: Request, may_be_missing: bool) -> Goal | None:
         raise UsageError("give --spp, --error or --time; rendering ends at the first that is reached")
     spp = request.spp
     if spp is not None:
-        parts = _method(request).replicates
-        spp = parts * math.ceil(spp / parts)
+        spp = GROUP * math.ceil(spp / GROUP)
         if spp != request.spp:
-            sequences = f"a multiple of {parts}, as Sobol' points come in {parts} independent sequences"
-            print(f"oracle: --spp {request.spp} becomes {spp}, {sequences}", file=sys.stderr)
+            print(f"oracle: --spp {request.spp} becomes {spp}, as samples come in groups of {GROUP}", file=sys.stderr)
     error = None if request.error is None else _percent("--error", request.error)
     return Goal(
         spp, error, None if request.time is None else _seconds(request.time), _percent("--share", request.share)

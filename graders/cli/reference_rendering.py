@@ -134,8 +134,9 @@ def samples_of(rendering: Rendering) -> tuple[Samples, ...]:
 
 def measured(rendering: Rendering, share: float) -> dict[str, Any]:
     """How good a rendering is, in the words of `About`."""
-    error = relative_error(rendering, share) if (rendering.mean > 0).any() else math.inf
-    return {"spp": rendering.spp, "share": share, "relative_error": error if math.isfinite(error) else None}
+    # A black image tells nothing of the error.
+    error = relative_error(rendering, share) if (rendering.mean > 0).any() else None
+    return {"spp": rendering.spp, "share": share, "relative_error": error}
 
 
 def is_reached(goal: Goal, about: About) -> bool:
@@ -190,7 +191,7 @@ def render_into(folder: Path, reference: Reference, plan: Plan, goes_on: bool) -
     Kept
         If it was interrupted after some samples.
     UsageError
-        If what is there shows something else, or nothing can come of it.
+        If what is there shows something else, or an error is asked for where no light is found.
     InvalidFile
         If what is there is broken.
     """
@@ -212,7 +213,7 @@ def render_into(folder: Path, reference: Reference, plan: Plan, goes_on: bool) -
                     status.samples, status.expected = rendering.spp, goal.samples(rendering)
                     status.error = measured(rendering, goal.share)["relative_error"]
                     display.line()
-        return saver.save()
+        about = saver.save()
     except BaseException as error:
         # Whatever it is, hours of work are not to be lost.
         if not saver.has_new:
@@ -221,6 +222,10 @@ def render_into(folder: Path, reference: Reference, plan: Plan, goes_on: bool) -
         if isinstance(error, KeyboardInterrupt):
             raise Kept(folder, about) from None
         raise
+    if about.relative_error is None and not is_reached(plan.goal, about):
+        nothing = f"no light reached a pixel in {about.spp} samples, so that --error says nothing"
+        raise UsageError(f"{reference.subject.name}: {nothing}; look at the scene, or give --spp as well")
+    return about
 
 
 def _remaining(goal: Goal, spent: float) -> tuple[Goal, bool]:
