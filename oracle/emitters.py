@@ -165,7 +165,7 @@ class CosineSky:
 
     @classmethod
     def cie_overcast(cls, up: Floats, zenith: Floats) -> CosineSky:
-        """The CIE standard overcast sky, three times as bright at the zenith as at the horizon [CIE S 011, type 16]."""
+        """The CIE standard overcast sky, three times as bright at the zenith as at the horizon [ISO 15469:2004]."""
         return cls(up, spectrum("zenith", zenith) / 3, zenith)
 
 

@@ -281,6 +281,29 @@ def test_round_shapes_exchange_as_much_there_as_back(disk, rest):
     assert 0 < there.error < 2e-10 * there.value
 
 
+@pytest.mark.parametrize("angle", [1.3, 1.6, 2.5, 3.0])
+def test_disks_cut_out_of_one_sphere_exchange_what_their_caps_do(angle):
+    # Each cap of a sphere sends to each part of the sphere its part of the area [Feingold 1978].
+    radius, heights = 0.5, np.array([0.45, 0.35])
+    axes = np.array([[0, 0, 1], [np.sin(angle), 0, np.cos(angle)]])
+    # The planes meet outside of the sphere.
+    assert angle > np.arccos(heights / radius).sum()
+    disks = [Disk(h * n, -n, np.sqrt(radius**2 - h**2)) for h, n in zip(heights, axes, strict=True)]
+    first, second = 2 * np.pi * radius * (radius - heights)
+    result = view_factor(*disks)
+    np.testing.assert_allclose(result.value * disks[0].area, first * second / (4 * np.pi * radius**2), rtol=1e-12)
+    assert result.error < 1e-9 * result.value
+
+
+def test_published_view_factors_are_found():
+    # Howell, C-41, with its radii 0.1 and 0.2 at a distance of 0.5; and a sphere above the corner of a square
+    # [Tripp, Hwang and Crank 1962]: the square is a face's quarter of a cube around the sphere.
+    disks = view_factor(Disk([0, 0, 0], UP, 0.1), Disk([0, 0, 0.5], -UP, 0.2))
+    np.testing.assert_allclose(disks.value, 0.1339, atol=5e-5)
+    square = rectangle([0.25, 0.25, 0], [0.25, 0, 0], [0, 0.25, 0])
+    np.testing.assert_allclose(view_factor(Sphere([0, 0, 0.5], 0.1), square).value, 1 / 24, rtol=1e-14)
+
+
 def test_a_disk_and_a_polygon_near_to_it_agree_with_a_polygon_in_place_of_the_disk():
     angles = np.linspace(0, 2 * np.pi, 128, endpoint=False)
     # Of the same area; second moments then differ by 1e-3.

@@ -39,9 +39,9 @@ def cosine_sky(emitter: CosineSky, normals: Floats) -> Bounded:
     -----
     With b the angle between normal and `up`, the visible half of the sky is a lune, over which the cosine integrates to
     ``a = pi (1 + cos b) / 2`` and the product of both cosines to ``s = 2/3 ((pi - b) cos b + sin b)``, so that
-    ``E = horizon (a - s) + zenith s``. For the CIE overcast sky this is its known tilted-plane irradiance
-    ``zenith (pi (1 + cos b) / 6 + 4/9 ((pi - b) cos b + sin b))`` [Moon and Spencer 1942 for b = 0]. The error is a few
-    ulp of the value, also for receivers that face the ground and see but a sliver of the sky.
+    ``E = horizon (a - s) + zenith s``. For the CIE overcast sky [ISO 15469:2004], whose zenith is three times its
+    horizon, this is ``zenith (pi (1 + cos b) / 6 + 4/9 ((pi - b) cos b + sin b))``, for b = 0 7/9 of ``pi zenith``. The
+    error is a few ulp of the value, also for receivers that face the ground and see but a sliver of the sky.
     """
     cross = compensated.cross(normals, np.broadcast_to(emitter.up, normals.shape))
     sine = np.hypot(np.hypot(cross[0], cross[1]), cross[2])

@@ -7,9 +7,8 @@ and r2, the angle D between them, their bisector w, and ``g = D/sin(D) - 1``, th
 
     l / (r1 r2) * (g/2 n . o + (w . o) (n . w))
 
-[after Nishita, Okamura and Nakamae 1985, who integrate the same in other terms]. Every part is small where the sum is
-small, so that far lines and receivers that nearly lie on the line's extension keep their digits. The horizon moves an
-end that is below it to where n . p = 0.
+by elementary integration over the angle. Every part is small where the sum is small, so that far lines and receivers
+that nearly lie on the line's extension keep their digits. The horizon moves an end that is below it to where n . p = 0.
 """
 
 from __future__ import annotations

@@ -26,8 +26,10 @@ _EMITTERS: dict[type[Any], Law] = {
     things.DirectionalEmitter: Law("E_0 cos(theta)", "Lambert 1760"),
     things.LineEmitter: Law("integral of I' sin(phi) cos(theta) / r^2 ds", "Lambert 1760"),
     things.ConstantEmitter: Law("pi L", "Lambert 1760"),
-    things.CosineSkyEmitter: Law("integral of (Lh + (Lz - Lh) sin(elevation)) cos(theta) dw", "Moon and Spencer 1942"),
-    things.OvercastSkyEmitter: Law("integral of Lz (1 + 2 sin(elevation)) / 3 cos(theta) dw", "CIE S 011:2003"),
+    things.CosineSkyEmitter: Law("integral of (Lh + (Lz - Lh) sin(elevation)) cos(theta) dw", "Lambert 1760"),
+    things.OvercastSkyEmitter: Law(
+        "integral of Lz (1 + 2 sin(elevation)) / 3 cos(theta) dw", "Lambert 1760; ISO 15469:2004 (CIE S 011), sky 16"
+    ),
     things.MapEmitter: Law("sum over texels of L times their projected solid angle", "Lambert 1760"),
 }
 

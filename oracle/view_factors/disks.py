@@ -16,8 +16,8 @@ def coaxial_disks(radius: Floats, target_radius: Floats, distance: Floats) -> Bo
     Notes
     -----
     ``F12 = 2 R2^2 / (R1^2 + R2^2 + h^2 + sqrt((h^2 + (R1 - R2)^2) (h^2 + (R1 + R2)^2)))``: the classical
-    ``(X - sqrt(X^2 - 4 (R2/R1)^2)) / 2`` [Howell, A Catalog of Radiation Heat Transfer Configuration Factors, parallel
-    coaxial disks], rationalised so that nothing cancels.
+    ``(X - sqrt(X^2 - 4 (R2/R1)^2)) / 2`` [Howell, A Catalog of Radiation Heat Transfer Configuration Factors, C-41],
+    rationalised so that nothing cancels.
     """
     near = np.hypot(distance, radius - target_radius)
     far = np.hypot(distance, radius + target_radius)

@@ -133,7 +133,7 @@ def parallel(x: Axis, y: Axis, gap: Floats) -> Bounded:
     Notes
     -----
     Sixteen terms, one for each pair of corners [Howell, A Catalog of Radiation Heat Transfer Configuration Factors,
-    parallel rectangles with parallel edges]. Where they cancel, Gauss quadrature of ``gap^2 / (pi r^4)``.
+    C-13]. Where they cancel, Gauss quadrature of ``gap^2 / (pi r^4)``.
     """
     result = _parallel_closed(x, y, gap)
     return _mended(
