@@ -13,7 +13,9 @@ from oracle.arrays import Floats
 class Bounded:
     """A value and a bound on its absolute error, in the same unit and of the same shape.
 
-    The bound covers rounding and quadrature, for arguments taken as exact; it is often a hundred times the error.
+    The bound covers rounding and quadrature, for arguments taken as exact; it is often a hundred times the error. For
+    rounding it follows from how the value is computed; what adaptive or iterated quadrature leaves is estimated from
+    rules of different order, and the functions that do so say it.
     Sums, and products with exact numbers, carry their bounds along.
     """
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from quadrature import converged
 from scipy.integrate import dblquad, quad
 
 from oracle.arrays import InvalidArgument
@@ -223,6 +224,57 @@ def test_with_the_right_integrand_the_integrator_finds_the_irradiance_of_lines()
     right = irradiance(dataclasses.replace(LINE, intensity_per_length=[1.0]), Receivers(points, normals))
     assert (np.abs(found.value - right.value[..., 0]) <= found.error + right.error[..., 0]).all()
     assert (found.error <= 1e-6 * right.value[..., 0] + 1e-12).all()
+
+
+POWERS = {
+    "no receiver cosine": (0, 1, 2),
+    "receiver cosine squared": (2, 1, 2),
+    "no light cosine": (1, 0, 2),
+    "light cosine squared": (1, 2, 2),
+    "distance to the power 1": (1, 1, 1),
+    "distance to the power 3": (1, 1, 3),
+    "no distance": (1, 1, 0),
+}
+# A point of the light and its normal, each (N, 3), and the area per unit square, (N,), for places (N, 2) in that.
+SURFACES = {
+    "rectangle": lambda st: (
+        np.array([-1, -1, 4]) + st @ np.array([[4, 0, 0], [0, 2, 0]]),
+        np.broadcast_to(DOWN, (len(st), 3)),
+        np.full(len(st), 8.0),
+    ),
+    "disk": lambda st: (
+        np.array([0, 0, 4]) + 3 * st[:, :1] * around(2 * np.pi * st[:, 1]),
+        np.broadcast_to(DOWN, (len(st), 3)),
+        18 * np.pi * st[:, 0],
+    ),
+}
+
+
+def around(angle):
+    return np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+
+
+@pytest.mark.parametrize("mistake", POWERS)
+@pytest.mark.parametrize("light", SURFACES)
+def test_the_estimate_of_the_error_covers_it(mistake, light):
+    # Receivers around the light's height, down to a tenth of its size away, that have all of it above their horizon.
+    random = np.random.default_rng(7)
+    a, b, k = POWERS[mistake]
+    for distance in (0.3, 1.0, 4.0, 40.0):
+        point = np.array([*random.uniform(-1, 1, 2), 4 - distance])
+
+        def density(st, point=point):
+            places, normals, area = SURFACES[light](st)
+            offset = places - point
+            r = np.linalg.norm(offset, axis=1)
+            return 2 * (offset[:, 2] / r) ** a * (-(offset * normals).sum(axis=1) / r) ** b / r**k * area
+
+        expected = converged(density, [0, 0], [1, 1])
+        found = mistaken_irradiance(MISTAKES[mistake], EMITTERS[light], Receivers(point, UP))
+        # The reference itself is right to 1e-11.
+        assert abs(found.value[0] - expected) <= found.error[0] + 1e-11 * expected
+        # An estimate that is no use would hold as well.
+        assert found.error[0] <= 1e-7 * expected
 
 
 def test_a_millionth_of_its_size_from_a_light_the_integrator_still_finds_it():

@@ -29,7 +29,8 @@ def disk(shape: Disk, points: Floats, normals: Floats, two_sided: bool) -> Bound
     Bounded
         Shape (N,). The error is a few ulp of the value while the whole disk is above the horizon, however far, near or
         edge-on it is, and below 1e-12 of the value if the horizon cuts it. It grows beyond that, like eps R / d, at a
-        distance d from the rim if the horizon cuts the disk, and where the horizon leaves only a sliver of it.
+        distance d from the rim if the horizon cuts the disk, and where the horizon leaves only a sliver of it. For
+        disks that are cut it is in part an estimate, see `segment`, and no proof.
 
     Notes
     -----

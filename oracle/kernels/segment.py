@@ -11,6 +11,10 @@ work:
   chord is elementary. Quadrature across the strips, double-exponential [Takahasi and Mori 1974] in asinh(tau / H),
   keeps nearly all digits, however thin, far or near the segment is, for twenty times the price. Gauss's suffices, for
   ten times, where the disk is three radii away or further.
+
+The bound of the contour counts roundings. That of the strips is an estimate: what leaving out every second, or two of
+three, of their nodes changes, raised to a power that supposes that digits grow with the number of nodes. Tests compare
+both with ball arithmetic, next to rims, edge-on and in slivers.
 """
 
 from __future__ import annotations

@@ -28,7 +28,8 @@ def sphere(shape: Sphere, points: Floats, normals: Floats, two_sided: bool) -> B
     -------
     Bounded
         Shape (N,). The error is a few ulp of the value, and below 1e-12 of it if the horizon cuts the sphere, but for
-        slivers: with a fraction f of the diameter above the horizon it grows like eps / f.
+        slivers: with a fraction f of the diameter above the horizon it grows like eps / f. For spheres that are cut it
+        is in part an estimate, see `segment`, and no proof.
 
     Notes
     -----

@@ -48,8 +48,9 @@ def mistaken_irradiance(
     -------
     Bounded
         Irradiance [W/m^2], or what the mistake makes of this unit, shape (..., C). The bound is that of
-        `oracle.irradiances` where the mistake leaves the integral alone; for other integrands it is an estimate of
-        adaptive quadrature, near 1e-8 of the value, and 1e-6 for receivers very near the light.
+        `oracle.irradiances` where the mistake leaves the integral alone. For other integrands it is an estimate, the
+        difference of two quadratures as in `oracle.adaptive` and no proof: near 1e-8 of the value, and 1e-6 for
+        receivers very near the light.
 
     Raises
     ------

@@ -48,8 +48,8 @@ class Patches:
 def over_shape(kernel: Kernel, shape: Shape, two_sided: bool, points: Floats, normals: Floats) -> Bounded:
     """Integral (N,) of a kernel over the visible part of a shape, for receivers (N, 3).
 
-    The bound is an estimate from two orders of quadrature, which has to be trusted rather than proved; the relative
-    error aimed at is 1e-8, more where rounding does not allow it.
+    The bound is an estimate, as `oracle.adaptive` tells; the relative error aimed at is 1e-8, more where rounding does
+    not allow it.
     """
     match shape:
         case Sphere():
