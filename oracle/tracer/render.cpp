@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstring>
 #include <limits>
 #include <mutex>
 #include <thread>
@@ -13,12 +14,13 @@ constexpr int tile = 16;
 // Larger than this a sample, in units of 2^exponent, is not added: its square would leave the range.
 constexpr double largest_sample = 0x1p28;
 
-// Adds a value in [0, 2^62) times 2^`shift`, rounded down to an integer; `shift` is between 0 and 64.
+// Adds a value in [0, 2^60) times 2^`shift`, rounded down to an integer; `shift` is between 0 and 64.
 void add(Sum& sum, double value, int shift) {
-    // Its first 63 bits, as an integer and where they belong.
-    int exponent;
-    const auto digits = static_cast<uint64_t>(std::frexp(value, &exponent) * 0x1p63);
-    const int left = exponent - 63 + shift;
+    // A double is 53 bits and where they belong.
+    uint64_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    const uint64_t digits = (bits & 0xfffffffffffffull) | 0x10000000000000ull;
+    const int left = int(bits >> 52) - 1075 + shift;
     uint64_t low = 0, high = 0;
     if (left >= 64)
         high = digits << (left - 64);
