@@ -17,7 +17,10 @@ from graders.cli.ask import QUESTIONS
 
 ORACLE = Path(sys.executable).with_name("oracle")
 DISK = "irradiance disk --center 0,0,2 --normal 0,0,-1 --radius 0.5 --radiance 10"
+RECTANGLE = "irradiance rectangle --center 0,0,2 --half-u 0,1,0 --half-v 1,0,0"
 VALUE = math.pi * 10 * 0.25 / 4.25
+BALL = "sphere center=0,0,1 radius=0.1"
+SHADE = "rectangle center=0,0,1 half_u=.1,0,0 half_v=0,.1,0"
 
 
 @pytest.fixture
@@ -122,8 +125,7 @@ def test_a_mesh_has_vertices_and_triangles(ask):
 def test_occluders_hide(ask):
     point = "irradiance point --position 0,0,2 --intensity 4"
     assert float(rows(ask(point)[1])[0][1]) == 1
-    ball = ("--occluder", "sphere center=0,0,1 radius=0.1")
-    shade = ("--occluder", "rectangle center=0,0,1 half_u=.1,0,0 half_v=0,.1,0")
+    ball, shade = ("--occluder", BALL), ("--occluder", SHADE)
     for hidden in (ball, shade, (*ball, *shade)):
         assert float(rows(ask(point, *hidden)[1])[0][1]) == 0
 
@@ -241,14 +243,18 @@ def test_a_terminal_gets_a_block_and_a_curve_within_80_columns():
         ((*DISK.split(), "--radius", "nan"), "--radius: 'nan' is no number"),
         ((*DISK.split(), "--radius", ""), "--radius is empty"),
         ((*DISK.split(), "--radius", "1,2"), "--radius: [1, 2]: input should be a valid number"),
-        ((*DISK.split(), "--center", "1,2"), "--center/2 is missing"),
-        ((*DISK.split(), "--center", "1"), "--center: 1: input should be a valid tuple"),
-        ((*DISK.split(), "--normal", "0,0,0"), "--normal: [0, 0, 0] has length 0; it must be a unit vector"),
+        ((*DISK.split(), "--center", "1,2"), "--center: '1,2' is not written as X,Y,Z"),
+        ((*DISK.split(), "--center", "1"), "--center: '1' is not written as X,Y,Z"),
+        ((*DISK.split(), "--center", "0,0,2m"), "--center: '2m' is no number"),
+        ((*DISK.split(), "--center", "1,2,3 4,5,6 7,8,9"), "--center: '1,2,3 4,5,6 7,8,9' is not written as X,Y,Z"),
+        ((*DISK.split(), "--normal", "0,0,0"), "--normal: '0,0,0' has no direction"),
         ((*DISK.split(), "--radiance", "-1"), "--radiance: -1.0 is negative"),
         ((*DISK.split(), "--radius", "1e999"), "--radius: inf: "),
-        ((*DISK.split(), "--occluder", ""), "occluders/0/type: \"\" is not a known type"),
+        ((*DISK.split(), "--occluder", ""), "--occluder '': type: \"\" is not a known type"),
         ((*DISK.split(), "--occluder", "sphere radius"), "--occluder: 'radius' is not written as name=value"),
-        ((*DISK.split(), "--occluder", "sphere radius=1"), "occluders/0/center is missing"),
+        ((*DISK.split(), "--occluder", "sphere radius=1"), "--occluder 'sphere radius=1': center is missing"),
+        ((*DISK.split(), "--occluder", SHADE), "occluders: no closed form for a Disk past occluders; a point, spot, "),
+        ((*RECTANGLE.split(), "--occluder", SHADE, "--occluder", BALL), f"--occluder '{BALL}': is a Sphere; "),
         ((*DISK.split(), "--table", "radius"), "--table: 'radius' is not written as name=first:last:count"),
         ((*DISK.split(), "--table", "raduis=1:2:3"), "there is no parameter 'raduis'; did you mean 'radius'?"),
         ((*DISK.split(), "--table", "radius=1:2:1"), "--table: a count of 1 is not between 2 and 10000"),
@@ -284,3 +290,12 @@ def test_help_fits_into_80_columns(command):
     assert result.stdout.startswith(f"Usage: oracle {' '.join(command)} ")
     assert max(map(len, result.stdout.splitlines())) <= 80
     assert "..." not in re.sub(r"\[?[A-Z]+\]?\.\.\.", "", result.stdout)
+
+
+def test_help_names_the_kinds_by_what_they_are_and_tells_what_has_to_be_given(ask):
+    assert re.search(r"\n\nEmitters:\n  polygon .*\n  overcast_sky ", ask("irradiance --help")[1], re.DOTALL)
+    assert "\nShapes:\n  polygon " in ask("solid-angle --help")[1]
+    help_text = ask("irradiance spot --help")[1]
+    assert re.search(r"--position X,Y,Z +in metres +\[required\]", help_text)
+    assert re.search(r"--cutoff-angle NUMBER +in radians, or as 30deg +\[required\]", help_text)
+    assert re.search(r"--intensity L or R,G,B +W/sr +\[default: 1\]", help_text)

@@ -24,6 +24,9 @@ from oracle.truth import KINDS, Answer, AnyCase, evaluate
 ORACLE = Path(sys.executable).with_name("oracle")
 DOCS = Path(__file__).parent.parent / "docs"
 DISK = {"type": "disk", "center": [0, 0, 2], "normal": [0, 0, -1], "radius": 0.5, "radiance": 10}
+RECTANGLE = {"type": "rectangle", "center": [0, 0, 2], "half_u": [0, 1, 0], "half_v": [1, 0, 0], "radiance": 1}
+BALL = {"type": "sphere", "center": [0, 0, 1], "radius": 0.1}
+TRIANGLE = {"type": "polygon", "vertices": [[0, 0, 1], [1, 0, 1], [0, 1, 1]]}
 GOOD = {"quantity": "irradiance", "emitter": DISK, "receiver": {"point": [0, 0, 0], "normal": [0, 0, 1]}}
 # E = pi L R^2 / (R^2 + d^2) on the axis.
 VALUE = math.pi * 10 * 0.25 / 4.25
@@ -194,7 +197,15 @@ BAD = [
     (changed("quantity", "iradiance"), "\"iradiance\" is not a known quantity; did you mean 'irradiance'?"),
     (changed("quantity", ["irradiance"]), "/1/quantity is no text; known: irradiance"),
     (changed("quantity", ...), "/1/quantity is missing; known: irradiance"),
-    (changed("occluders", [{"type": "sphere", "center": [0, 0, 1], "radius": 0.1}]), "/1: "),
+    (changed("occluders", [BALL]), "/1: occluders: no closed form for a Disk past occluders"),
+    (
+        {**changed("emitter", RECTANGLE), "occluders": [TRIANGLE, BALL]},
+        "/1/occluders/1: is a Sphere; a Polygon, Rectangle or Mesh is supported",
+    ),
+    (
+        {**changed("emitter", ...), "emitters": [DISK, {**DISK, "radiance": [1, 2]}]},
+        "/1/emitters/1: has 2 channels, emitter[0] has 1",
+    ),
     (
         changed("emitter", {"type": "polygon", "vertices": [[0, 0, 1]] * 3, "radiance": 1}),
         "/1/emitter: vertices enclose no area",

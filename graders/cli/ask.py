@@ -30,6 +30,7 @@ from reference_scenes.loading import suggest
 
 _NUMBER = re.compile(r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)(?P<degrees>deg)?")
 _AXES = {"x": 0, "y": 1, "z": 2}
+_UNIT_HELP = {"m": "in metres", "rad": "in radians, or as 30deg", "unit vector": "direction, of any length"}
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Question:
             is_flag=field.annotation is bool,
             is_direction=any(getattr(one, "func", None) is require_unit for one in field.metadata),
             metavar=lists.get(name, "L or R,G,B" if is_light else "NUMBER" if field.annotation is float else "X,Y,Z"),
-            help=(field.description or "").replace("unit vector", "direction, of any length"),
+            help=_UNIT_HELP.get(field.description or "", field.description or ""),
         )
 
 
@@ -82,12 +83,12 @@ def _kinds(union: Any, *left_out: str) -> dict[str, type[BaseModel]]:
 
 
 _RECEIVER = {
-    "point": Parameter(("receiver", "point"), "0,0,0", help="where the light arrives; m"),
+    "point": Parameter(("receiver", "point"), "0,0,0", help="where the light arrives, in metres"),
     "facing": Parameter(
         ("receiver", "normal"), "0,0,1", is_direction=True, help="the receiver's normal, of any length"
     ),
 }
-_POINT = {"point": Parameter(("point",), "0,0,0", help="where it is seen from; m")}
+_POINT = {"point": Parameter(("point",), "0,0,0", help="where it is seen from, in metres")}
 QUESTIONS = {
     # A map has more texels than a command line has room for.
     "irradiance": Question("irradiance", "emitter", _kinds(Emitter, "map"), _RECEIVER, takes_occluders=True),
@@ -111,7 +112,7 @@ def command(name: str, kind: str) -> click.Command:
             is_flag=parameter.is_flag,
             show_default=parameter.default is not None,
             metavar=None if parameter.is_flag else parameter.metavar,
-            help=parameter.help,
+            help=parameter.help if parameter.is_flag or parameter.default else f"{parameter.help}  [required]",
         )
         for field, parameter in parameters.items()
     ]
@@ -128,8 +129,7 @@ def command(name: str, kind: str) -> click.Command:
         _run(question, kind, parameters, given, occluders, table, plot, as_json)
 
     summary = " ".join((question.kinds[kind].__doc__ or "").replace("`", "").split())
-    notes = "Positions are in metres; an angle is in radians, or in degrees if written as 30deg."
-    return click.Command(kind, callback=run, params=options, help=f"{summary}\n\n{notes}", short_help=summary)
+    return click.Command(kind, callback=run, params=options, help=summary, short_help=summary)
 
 
 def _run(
@@ -150,7 +150,7 @@ def _run(
     for name, parameter in parameters.items():
         value = given[name]
         if value is not None:
-            _put(case, parameter.path, value if parameter.is_flag else _parsed(value, _option(name)))
+            _put(case, parameter.path, value if parameter.is_flag else _checked(parameter, value, _option(name)))
         elif swept != (name, None):
             raise UsageError(f"Missing option '{_option(name)}'.")
     if occluders:
@@ -160,7 +160,7 @@ def _run(
         _scale(case, directions)
         answer = answers([case])[0]
         if not isinstance(answer, Answer):
-            raise UsageError(_in_options(answer, parameters))
+            raise UsageError(_in_options(answer, parameters, occluders))
         _print(question, case, answer, as_json)
         return
 
@@ -173,7 +173,8 @@ def _run(
     found = []
     for value, answer in zip(sweep.values, answers(cases), strict=True):
         if not isinstance(answer, Answer):
-            raise UsageError(f"--table {sweep.name}={value!r}: {_in_options(answer, parameters)}")
+            complaint = _in_options(answer, parameters, occluders)
+            raise UsageError(f"--table {sweep.name}={value!r}: {complaint}")
         found.append(answer)
     print_table_of(Table(question.quantity.replace("_", " "), sweep, found), plot, as_json)
 
@@ -183,6 +184,17 @@ def _run(
 
 def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
+
+
+def _checked(parameter: Parameter, text: str, option: str) -> Any:
+    """A value as it is parsed; a vector has three components, and a direction a length."""
+    value = _parsed(text, option)
+    if parameter.metavar == "X,Y,Z":
+        if not isinstance(value, list) or len(value) != 3 or any(isinstance(one, list) for one in value):
+            raise UsageError(f"{option}: {text[:80]!r} is not written as X,Y,Z")
+        if parameter.is_direction and not any(value):
+            raise UsageError(f"{option}: {text[:80]!r} has no direction")
+    return value
 
 
 def _parsed(text: str, option: str) -> Any:
@@ -267,9 +279,12 @@ def _put_swept(case: Any, parameters: dict[str, Parameter], swept: tuple[str, in
 # --------------------------------------------------------------------------------------------- answers
 
 
-def _in_options(error: InvalidArgument, parameters: dict[str, Parameter]) -> str:
+def _in_options(error: InvalidArgument, parameters: dict[str, Parameter], occluders: tuple[str, ...]) -> str:
     """A complaint about a case in the words of the command line."""
     text = str(error)
+    found = re.match(r"/?occluders[/[](\d+)[]/:]*", text)
+    if found:
+        return f"--occluder {occluders[int(found[1])][:80]!r}: {text[found.end() :].strip()}"
     for name, parameter in parameters.items():
         pointer = "/" + "/".join(parameter.path)
         if text.startswith(pointer) and text[len(pointer) : len(pointer) + 1] in (":", "/", " "):

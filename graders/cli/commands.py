@@ -166,6 +166,15 @@ class _Kinds(click.Group):
 
         return command(self.name or "", cmd_name)
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Kinds are no commands to whoever reads of them."""
+        from graders.cli.ask import QUESTIONS
+
+        width = formatter.width
+        kinds = [(name, self.get_command(ctx, name).get_short_help_str(4 * width)) for name in self.list_commands(ctx)]
+        with formatter.section(f"{QUESTIONS[self.name or ''].thing.title()}s"):
+            formatter.write_dl(kinds)
+
 
 @oracle.group(cls=_Kinds, subcommand_metavar="EMITTER [OPTIONS]", short_help="Irradiance at a point.")
 def irradiance() -> None:

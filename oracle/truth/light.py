@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
-from operator import add
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -15,7 +13,7 @@ from oracle.arrays import Floats
 from oracle.bounded import Bounded
 from oracle.emitters import Receivers
 from oracle.irradiances import irradiance
-from oracle.truth.case import Case, InvalidField, Law, building
+from oracle.truth.case import Case, Law, building
 from oracle.truth.fields import Vector
 from oracle.truth.laws import irradiance_of
 from oracle.truth.things import (
@@ -87,14 +85,12 @@ class Irradiance(_Lit):
     def computed(cls, together: Sequence[Self]) -> Bounded:
         """Irradiance of shape (N,), or (N, C) if an emitter has channels."""
         first = together[0]
+        occluders = []
+        for index, occluder in enumerate(first.occluders):
+            with building(f"occluders/{index}"):
+                occluders.append(shape_of(occluder))
         receivers = receivers_of([case.receiver for case in together])
-        built = first.built()
-        if not first.occluders:
-            return first.in_form(irradiance(built, receivers))
-        found = [_past_occluders(first, *each, receivers) for each in zip(first.shining(), built, strict=True)]
-        if len({part.value.shape for part in found}) > 1:
-            raise InvalidField("/emitters", "their numbers of channels differ")
-        return first.in_form(reduce(add, found))
+        return first.in_form(irradiance(first.built(), receivers, occluders))
 
 
 class VectorIrradiance(_Lit):
@@ -116,24 +112,6 @@ class VectorIrradiance(_Lit):
 
         points = np.array([case.point for case in together])
         return together[0].in_form(vector_irradiance(together[0].built(), points))
-
-
-def _past_occluders(case: Irradiance, name: str, emitter: sources.Emitter, receivers: Receivers) -> Bounded:
-    """Irradiance (N, C) of what the occluders of a case leave of an emitter."""
-    from oracle.visibility import visible, visible_projected_solid_angle
-
-    occluders = []
-    for index, occluder in enumerate(case.occluders):
-        with building(f"occluders/{index}"):
-            occluders.append(shape_of(occluder))
-    match emitter:
-        case sources.Area():
-            factor = visible_projected_solid_angle(emitter.shape, receivers, occluders, emitter.two_sided)
-            return Bounded(factor.value[:, None], factor.error[:, None]) * emitter.radiance
-        case sources.Point() | sources.Spot() | sources.Directional():
-            seen = visible(emitter, receivers.points, occluders)
-            return irradiance(emitter, receivers) * seen[:, None].astype(np.float64)
-    raise InvalidField(f"/{name}/type", "what occluders leave is known for points, parallel light and flat shapes only")
 
 
 def receivers_of(models: Sequence[Receiver]) -> Receivers:
