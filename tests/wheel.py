@@ -141,19 +141,20 @@ def test_the_licences_of_all_that_is_in_it_come_along(content):
 
 
 @pytest.fixture(scope="module")
-def installed(wheel, tmp_path_factory):
+def installed(wheel):
     """The programs of an environment that holds the wheel and what pip takes along, in the locked versions."""
-    folder = tmp_path_factory.mktemp("installed")
     lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
-    constraints = folder / "constraints.txt"
-    constraints.write_text("\n".join(re.findall(r"^[a-z0-9.-]+==[^\\\n]*", lock, re.MULTILINE)), encoding="utf-8")
-    venv.create(folder / "venv", with_pip=True)
-    programs = folder / "venv" / "bin"
-    done(
-        programs / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-input",
-        "-c", constraints, wheel,
-    )  # fmt: skip
-    return programs
+    # Hundreds of megabytes, which pytest would keep.
+    with tempfile.TemporaryDirectory() as folder:
+        constraints = Path(folder) / "constraints.txt"
+        constraints.write_text("\n".join(re.findall(r"^[a-z0-9.-]+==[^\\\n]*", lock, re.MULTILINE)), encoding="utf-8")
+        venv.create(Path(folder) / "venv", with_pip=True)
+        programs = Path(folder) / "venv" / "bin"
+        done(
+            programs / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-input",
+            "-c", constraints, wheel,
+        )  # fmt: skip
+        yield programs
 
 
 @pytest.fixture(scope="module")
