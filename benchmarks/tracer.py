@@ -65,7 +65,7 @@ def in_mitsuba(folder: Path, name: str, depth: int) -> object:
 
 
 MODELS = {name: family.member(0) for name, family in FAMILIES.items()} | {
-    "cornell": SCENES["cornell-box"].scene(),
+    "cornell": SCENES["cornell-box"](),
 }
 
 
