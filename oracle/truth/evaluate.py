@@ -65,7 +65,7 @@ def _complaint(error: Exception) -> InvalidArgument:
     if isinstance(error, InvalidField):
         return error
     if isinstance(error, InvalidArgument):
-        # Sequences of a case have their index; it knows nothing of the array of one receiver, or cosine, that it became.
+        # Sequences of a case have their index; it knows nothing of the array of one receiver that it became.
         reason, found = re.subn(r"^(occluder|emitter)s?\[(\d+)\]", r"/\1s/\2:", str(error))
         return InvalidArgument(reason if found else re.sub(r"^(\w+)\[0\]", r"\1", reason))
     return InvalidArgument("leaves the range of float64")
