@@ -276,8 +276,12 @@ bool arrive(const Scene& scene, const Method& method, Path& path, bool hit, Surf
         if (!front) s.shading = -s.shading;
     }
     const Frame frame(s.shading);
+    const Bsdf bsdf = scene.bsdf(s, material);
     const float reach = std::max(s.distance, s.extent);
-    const Vertex vertex{Vertex::Kind::surface, s.p, s.normal, reach, frame, scene.bsdf(s, material), frame.to_local(back)};
+    // Rounding may have put the point behind another surface where two meet, but back along the ray there is none. Light
+    // that is let through needs it where it is.
+    const Vec3 p = bsdf.transmits() ? s.p : s.p + rounding(s.p, reach) * back;
+    const Vertex vertex{Vertex::Kind::surface, p, s.normal, reach, frame, bsdf, frame.to_local(back)};
     return scatter(scene, method, path, vertex, draw, connection);
 }
 

@@ -158,9 +158,12 @@ private:
     float environment_importance_ = 0;
 };
 
+// More than rounding can have moved a point that was computed from numbers as large as `reach`.
+inline float rounding(const Vec3& p, float reach) { return 5e-7f * std::max(largest(p), std::min(reach, 1e18f)); }
+
 // Off a surface, to the side where `direction` points, by more than rounding can have moved the point.
-inline Vec3 off_surface(const Vec3& p, const Vec3& normal, const Vec3& direction, float distance) {
-    const float step = 5e-7f * std::max(largest(p), std::min(distance, 1e18f));
+inline Vec3 off_surface(const Vec3& p, const Vec3& normal, const Vec3& direction, float reach) {
+    const float step = rounding(p, reach);
     return p + (dot(normal, direction) < 0 ? -step : step) * normal;
 }
 
