@@ -7,8 +7,10 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// From this reflection on a path may end by chance; from the later one on even if it has lost nothing.
-constexpr int roulette_from = 4, roulette_for_all_from = 128;
+// From this reflection on a path may end by chance; from the later one on even if it has lost nothing, but so rarely that
+// the variance stays finite wherever a reflection loses more than 0.05 %.
+constexpr int roulette_from = 4, roulette_for_all_from = 1024;
+constexpr float longest_survival = 0.999f;
 
 float balance(float a, float b) { return a / (a + b); }
 
@@ -228,7 +230,7 @@ bool scatter(const Scene& scene, const Method& method, Path& path, const Vertex&
     if (path.bounce >= roulette_from) {
         // What refraction did to the radiance on the way in it undoes on the way out, so that counts for nothing here.
         float survives = std::min(max_component(path.throughput) * path.bent, 1.0f);
-        if (path.bounce >= roulette_for_all_from) survives = std::min(survives, 0.95f);
+        if (path.bounce >= roulette_for_all_from) survives = std::min(survives, longest_survival);
         if (survives < 1) {
             if (draw.roulette >= survives) return false;
             path.throughput *= 1 / survives;
