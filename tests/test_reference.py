@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import resource
+import select
 import signal
 import subprocess
 import sys
@@ -287,21 +288,21 @@ def test_no_error_is_reached_where_no_light_is(oracle, tmp_path):
 
 
 def test_rendering_ends_when_time_is_over(oracle, scene):
-    began = time.monotonic()
     code, _, _ = oracle(scene, "--error", "0.0001%", "--time", "0.5s", "-o", "out")
+    about = read_about(Path("out"))
     assert code == 0
-    assert 0.5 <= read_about(Path("out")).seconds < 30
-    assert time.monotonic() - began < 60
+    assert about.seconds >= 0.5
+    assert about.relative_error > 1e-6
 
 
 def test_time_before_an_interruption_counts(oracle, scene):
     oracle(scene, "--time", "0.3", "-o", "out")
-    before = content("out")["reference.exr"]
-    spp = read_about(Path("out")).spp
+    before = read_about(Path("out"))
     assert oracle(scene, "--time", "0.3s", "--resume", "-o", "out")[0] == 0
-    assert content("out")["reference.exr"] == before
-    assert oracle(scene, "--time", "0.6s", "--resume", "-o", "out")[0] == 0
-    assert read_about(Path("out")).spp > spp
+    assert read_about(Path("out")) == before
+    assert oracle(scene, "--time", f"{before.seconds + 0.2}s", "--resume", "-o", "out")[0] == 0
+    assert read_about(Path("out")).spp > before.spp
+    assert read_about(Path("out")).seconds >= before.seconds + 0.2
 
 
 # ------------------------------------------------------------------------------------------- interrupted
@@ -314,13 +315,17 @@ def started(*arguments, cwd):
     # Without git there is no revision, which could change meanwhile.
     environment = {**os.environ, "PATH": "/nowhere", "TERM": "xterm", "COLUMNS": "120"}
     command = [ORACLE, "reference", *map(str, arguments), "--threads", "1"]
-    process = subprocess.Popen(command, cwd=cwd, env=environment, stdin=inside, stdout=inside, stderr=inside)
+    # Jobs in the background hand down that they ignore interruptions.
+    heed = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    process = subprocess.Popen(command, cwd=cwd, env=environment, stdin=inside, stdout=inside, stderr=inside, **heed)
     os.close(inside)
     seen = b""
+    deadline = time.monotonic() + 300
 
     def wait_for(words):
         nonlocal seen
         while words not in seen:
+            assert select.select([terminal], [], [], max(0.0, deadline - time.monotonic()))[0], seen
             try:
                 chunk = os.read(terminal, 65536)
             except OSError:  # Linux says so when the other end is closed
@@ -887,6 +892,15 @@ def test_a_broken_description_in_a_cache_is_stale_and_named(cache):
     found = states(cache("--check"))
     assert found["sphere-0"][0] == "stale"
     assert f"{path}: line 1, column 2: not JSON" in found["sphere-0"][1]
+
+
+def test_a_broken_state_in_a_cache_is_rendered_again_when_more_is_asked_for(cache):
+    cache("--spp", 8)
+    state = next(Path("cache").glob("sphere-*/state.npz"))
+    state.write_bytes(b"broken")
+    assert cache("--spp", 16)[0] == 0
+    assert read_state(state.parent)[1].spp == 16
+    assert cache("--check", "--spp", 16)[0] == 0
 
 
 def test_an_interrupted_cache_goes_on_with_the_same_command(cache, monkeypatch):

@@ -61,13 +61,21 @@ def fill(subjects: Sequence[Subject], cache: Path, plan: Plan) -> None:
             row = entry.row
             if entry.state != "fresh":
                 with writing(entry.folder):
-                    about = render_into(entry.folder, entry.reference, plan, True)
+                    about = _render(entry, plan)
                 row = entry.folder.name, "rendered", quality(about)
                 if entry.state == "stale":
                     row = (*row[:2], f"{row[2]}; was stale: {entry.because}")
             rows.append(row)
     finally:
         print_table(output(), ("reference", "state", "because"), rows)
+
+
+def _render(entry: Entry, plan: Plan) -> About:
+    try:
+        return render_into(entry.folder, entry.reference, plan, True)
+    except InvalidFile:
+        # A cache holds nothing that cannot be had again.
+        return render_into(entry.folder, entry.reference, plan, False)
 
 
 def _entries(subjects: Sequence[Subject], cache: Path, goal: Goal | None, method: Method) -> Iterator[Entry]:
