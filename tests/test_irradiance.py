@@ -353,16 +353,16 @@ def test_the_walls_of_a_closed_room_receive_all_flux_that_is_emitted_in_it(emitt
 SQUARE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 
 
-def area_lights():
+def area_lights(radiance=ONE):
     """One of each area light with its centroid at the origin, facing +z, with its area projected on z = 0."""
     triangle = SQUARE[:3] - SQUARE[:3].mean(axis=0)
     return [
-        (Area(Polygon(SQUARE), ONE), 4),
-        (Area(Polygon(triangle), ONE), 2),
-        (Area(Rectangle([0, 0, 0], [2, 0, 0], [0, 1, 0]), ONE), 8),
-        (Area(Mesh(triangle, [[0, 1, 2]]), ONE), 2),
-        (Area(Disk([0, 0, 0], [0, 0, 1], 1), ONE), np.pi),
-        (Area(Sphere([0, 0, 0], 1), ONE), np.pi),
+        (Area(Polygon(SQUARE), radiance), 4),
+        (Area(Polygon(triangle), radiance), 2),
+        (Area(Rectangle([0, 0, 0], [2, 0, 0], [0, 1, 0]), radiance), 8),
+        (Area(Mesh(triangle, [[0, 1, 2]]), radiance), 2),
+        (Area(Disk([0, 0, 0], [0, 0, 1], 1), radiance), np.pi),
+        (Area(Sphere([0, 0, 0], 1), radiance), np.pi),
     ]
 
 
@@ -465,14 +465,14 @@ def test_motion_and_scale_change_nothing(receiver, rotation, shift, scale):
 
     point, normal = receiver
     front = rotation @ [0, 0, 1]
-    there = [
-        Area(Polygon(moved(SQUARE)), ONE),
-        Area(Polygon(moved(SQUARE[:3])), ONE),
-        Area(Disk(moved([0, 0, 0]), front, scale), ONE),
-        Area(Sphere(moved([0, 0, 0]), scale), ONE),
-    ]
+    lights = {
+        Area(Polygon(SQUARE), ONE): Area(Polygon(moved(SQUARE)), ONE),
+        Area(Polygon(SQUARE[:3]), ONE): Area(Polygon(moved(SQUARE[:3])), ONE),
+        Area(Disk([0, 0, 0], [0, 0, 1], 1), ONE): Area(Disk(moved([0, 0, 0]), front, scale), ONE),
+        Area(Sphere([0, 0, 0], 1), ONE): Area(Sphere(moved([0, 0, 0]), scale), ONE),
+    }
     point = point if np.linalg.norm(point) > 1.05 else 2 * unit(point)
-    for (here, _), elsewhere in zip(area_lights(), there, strict=True):
+    for here, elsewhere in lights.items():
         found = of(elsewhere, moved(point), rotation @ normal)
         assert_equal_up_to(AFTER_MOTION, found, of(here, point, normal))
 
