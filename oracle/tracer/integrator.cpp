@@ -217,7 +217,8 @@ bool scatter(const Scene& scene, const Method& method, Path& path, const Vertex&
     }
     path.diffuse = vertex.is_diffuse();
     // The last ray would find nothing that was not sampled.
-    if (path.bounce + 1 == method.bounces && !smooth &&
+    const bool mirrors = vertex.kind == Vertex::Kind::surface && vertex.bsdf.has_delta();
+    if (path.bounce + 1 == method.bounces && !mirrors &&
         (method.strategy == Strategy::light ||
          (method.strategy == Strategy::mis && path.diffuse && scene.leaves_all_to_sampling(vertex.p))))
         return false;
