@@ -283,7 +283,7 @@ bool arrive(const Scene& scene, const Method& method, Path& path, bool hit, Surf
     const float reach = std::max(s.distance, s.extent);
     // Rounding may have put the point behind another surface where two meet, but back along the ray there is none. Light
     // that is let through needs it where it is.
-    const Vec3 p = bsdf.transmits() ? s.p : s.p + rounding(s.p, reach) * back;
+    const Vec3 p = bsdf.transmits() ? s.p : s.p + rounding(s.p, s.distance) * back;
     const Vertex vertex{Vertex::Kind::surface, p, s.normal, reach, frame, bsdf, frame.to_local(back)};
     return scatter(scene, method, path, vertex, draw, connection);
 }
