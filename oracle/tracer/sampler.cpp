@@ -89,10 +89,12 @@ void draw_philox(uint64_t seed, uint32_t pixel, uint32_t first_sample, uint32_t 
 Sampler::Sampler(SamplerKind kind, uint64_t seed, uint32_t pixel, uint32_t first_sample, uint32_t replicates)
     : kind_(kind), seed_(seed), pixel_(pixel), first_sample_(first_sample) {
     if (kind == SamplerKind::independent) return;
+    // Zero, which hashes leave as it is, would be no scrambling at all: so it is none of the usual seeds.
+    const uint64_t start = mix(seed + uint64_t{0x9e3779b97f4a7c15});
     for (uint32_t i = 0; i < batch; ++i) {
         const uint32_t sample = first_sample + i;
         reversed_index_[i] = reverse_bits(sample / replicates);
-        const uint64_t hash = mix(mix(seed) + (uint64_t{sample % replicates} << 32 | pixel));
+        const uint64_t hash = mix(start + (uint64_t{sample % replicates} << 32 | pixel));
         low_[i] = static_cast<uint32_t>(hash), high_[i] = static_cast<uint32_t>(hash >> 32);
     }
 }
