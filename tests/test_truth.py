@@ -18,8 +18,9 @@ from graders.cli import _run
 from graders.cli.reading import Unreadable, read_values
 from graders.errors import UsageError
 from oracle import emitters, shapes
+from oracle.bounded import Bounded
 from oracle.irradiances import irradiance
-from oracle.truth import KINDS, Answer, AnyCase, evaluate
+from oracle.truth import KINDS, Answer, AnyCase, Case, evaluate
 
 ORACLE = Path(sys.executable).with_name("oracle")
 DOCS = Path(__file__).parent.parent / "docs"
@@ -162,6 +163,25 @@ def test_answers_do_not_depend_on_what_else_is_asked(asked):
     _, shuffled, _ = asked([cases[index] for index in order])
     for answer, index in zip(shuffled, order, strict=True):
         assert (answer["value"], answer["error"]) == (answers[index]["value"], answers[index]["error"])
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        lambda: Bounded(np.full(1, 1e200) * 1e200, np.zeros(1)),
+        lambda: Bounded(np.full(1, np.inf), np.zeros(1)),
+        lambda: Bounded(np.zeros(1), np.full(1, np.nan)),
+    ],
+    ids=["overflow on the way", "infinite value", "unknown error"],
+)
+def test_what_leaves_the_range_of_float64_has_no_answer(found):
+    class Immense(Case):
+        @classmethod
+        def computed(cls, together):
+            return found()
+
+    (answer,) = evaluate([Immense()])
+    assert str(answer).endswith("leaves the range of float64")
 
 
 def test_cases_are_computed_together_though_one_of_them_is_bad():

@@ -17,7 +17,7 @@ from oracle.visibility.convex import convex_parts
 _EPSILON = float(np.finfo(np.float64).eps)
 
 # Parts of the surface whose two quadratures differ by less than this part of the whole are not divided further.
-_TOLERANCE = 1e-11
+_TOLERANCE = 1e-12
 # After so many parts it ends, in some seconds, and the bound tells what is missing.
 _MOST = 1 << 14
 # Distances below so many roundings count as touching.

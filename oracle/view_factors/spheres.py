@@ -16,7 +16,7 @@ from oracle.visibility.convex import convex_parts
 _EPSILON = float(np.finfo(np.float64).eps)
 
 # Parts of the meridian whose two quadratures differ by less than this part of the whole are not divided further.
-_TOLERANCE = 1e-11
+_TOLERANCE = 1e-12
 # Distances below so many roundings count as touching.
 _TOUCH = 16 * _EPSILON
 
