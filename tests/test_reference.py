@@ -460,13 +460,17 @@ def test_going_on_from_nothing_is_starting(oracle, scene):
 
 def test_going_on_adds_the_runs_up(oracle, scene):
     oracle(scene, "--spp", 16, "--threads", 1, "-o", "out")
-    first = read_about(Path("out")).runs
     oracle(scene, "--spp", 32, "--threads", 1, "--resume", "-o", "out")
-    (run,) = read_about(Path("out")).runs
-    assert run.spp == 32
-    assert run.seconds > first[0].seconds
     oracle(scene, "--spp", 40, "--threads", 2, "--resume", "-o", "out")
     assert [(run.threads, run.spp) for run in read_about(Path("out")).runs] == [(1, 32), (2, 8)]
+
+
+def test_runs_that_differ_in_samples_and_time_alone_are_one():
+    def one(revision, spp, seconds):
+        return references.Run(revision=revision, embree="3", threads=1, spp=spp, seconds=seconds)
+
+    runs = one("a", 16, 1.5), one("b", 24, 4.0), one("a", 8, 2.0)
+    assert references.joined(runs) == (one("a", 24, 3.5), one("b", 24, 4.0))
 
 
 def test_a_folder_with_a_reference_is_not_written_over_by_mistake(oracle, scene):

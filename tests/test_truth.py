@@ -136,6 +136,11 @@ def test_light_comes_back_in_the_form_in_which_it_was_given(asked):
     assert none == 0
 
 
+def test_a_normal_that_is_rounded_to_seven_digits_is_scaled_to_length_1(asked):
+    _, answers, _ = asked([changed("receiver/normal", [0, 0, 1.0000005])])
+    assert answers[0]["value"] == pytest.approx(VALUE, rel=1e-14)
+
+
 def test_several_emitters_add_up(asked):
     both = {**changed("emitter", ...), "emitters": [DISK, {"type": "point", "position": [0, 0, 2], "intensity": 4}]}
     _, (answer,), _ = asked([both])
@@ -206,6 +211,7 @@ BAD = [
     (changed("emitter/raduis", 1), "/1/emitter/raduis is not a known key; did you mean 'radius'?"),
     (changed("emitter/center", [0, 0]), "/1/emitter/center/2 is missing"),
     (changed("emitter/normal", [0, 0, -2]), "/1/emitter/normal: [0, 0, -2] has length 2; it must be a unit vector"),
+    (changed("receiver/normal", [0, 0, 1.00001]), "/1/receiver/normal: [0, 0, 1.00001] has length 1.00001; it must be"),
     (changed("emitter/radiance", [1, -2]), "/1/emitter/radiance: [1, -2] is negative; light is at least 0"),
     (changed("emitter/radiance", []), "/1/emitter/radiance: [] is empty"),
     (changed("emitter/radiance", "1"), '/1/emitter/radiance: "1" is neither a number nor a list of numbers'),

@@ -51,7 +51,7 @@ def view_factor(source: Shape | Receivers, target: Shape) -> Bounded:
     Closed forms: surface elements; rectangles whose edges are parallel to one another; coaxial disks; a sphere and a
     flat shape whose plane it does not reach through. All other flat polygons by quadrature to rounding. All other pairs
     by adaptive quadrature of the closed form for surface elements, with a bound, near 1e-11 of the value, that is an
-    estimate from two orders and no proof; it takes some 10 ms, seconds if round outlines touch or nearly coincide.
+    estimate from two orders and no proof; it takes seconds if round outlines touch or nearly coincide.
     Shapes may touch. A mesh is the sum of its triangles, which do not hide one another. Reciprocity,
     ``A1 F12 = A2 F21``, exchanges source and target.
     """
@@ -63,8 +63,9 @@ def view_factor(source: Shape | Receivers, target: Shape) -> Bounded:
 def view_factors(sources: Sequence[Shape], targets: Sequence[Shape]) -> Bounded:
     """View factors from each of S sources to each of T targets, shape (S, T); see `view_factor`.
 
-    Many rectangles with parallel edges take some microseconds for each pair, other polygons milliseconds. Nothing hides
-    anything: for the inside of a convex enclosure this is the matrix of its radiosity equation.
+    Many rectangles with parallel edges take some microseconds for each pair, other polygons milliseconds, disks and
+    spheres without closed form tens of them. Nothing hides anything: for the inside of a convex enclosure this is the
+    matrix of its radiosity equation.
     """
     if not len(sources) or not len(targets):
         raise InvalidArgument(f"{'targets' if len(sources) else 'sources'} is an empty sequence")

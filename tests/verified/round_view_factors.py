@@ -218,5 +218,6 @@ FORMS = [
     Form("view factor of disks in any position", pairs_of_disks(), computed, exact_disks, share=0.05),
     Form("view factor of a disk and a triangle", disks_and_triangles(), computed, exact_triangle, share=0.05),
     Form("view factor of spheres", spheres(), lambda c: computed(both(c)), exact_spheres, share=0.05),
-    Form("view factor of a disk and a sphere in its plane", sunk_spheres(), computed, exact_sunk, share=0.05),
+    # Next to the sphere, the cut sphere's own bound grows.
+    Form("view factor of a disk and a sphere in its plane", sunk_spheres(), computed, exact_sunk, share=0.1),
 ]
