@@ -9,18 +9,22 @@ plane through edge and receiver [Lambert 1760; Nishita and Nakamae 1985; Arvo 19
   ``Theta_i / |v_i x v_j|`` is therefore split off and summed as an area; what is left of it, g_i, is small and computed
   without cancellation.
 
-Arrays of vectors have the shape (3, ...) here: numpy works fastest on long last axes.
+Arrays of vectors have the shape (3, ...) here: numpy works fastest on long last axes. Outlines are closed: their last
+vertex is the first once more, so that slices hold the starts and the ends of all edges. All edges are computed as if
+whole; those that pass through the horizon are then replaced by their part above it.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle.arrays import Floats
+from oracle.arrays import Booleans, Floats, Integers
 from oracle.bounded import Bounded
+from oracle.chunks import chunks
 from oracle.shapes import Polygon
 
 # float64, and longer where that is not enough.
@@ -33,6 +37,10 @@ _FAR = 0.15**2
 _POOR = 2e-11
 # Rounding errors in units of eps times the magnitude of what is added up; the largest found in verification was 3.
 _ROUNDINGS = 8.0
+# Vertices at once, of all receivers together: intermediate results stay within the processor's cache.
+_AT_ONCE = 24000
+# Added to a cosine of 0 it avoids a division by 0; next to those of other angles it is nothing.
+_NOTHING = 1e-150
 
 
 def polygon(shape: Polygon, points: Floats, normals: Floats, two_sided: bool) -> Bounded:
@@ -52,18 +60,18 @@ def polygon(shape: Polygon, points: Floats, normals: Floats, two_sided: bool) ->
         Shape (N,). The error is a few ulp of the value where cosines of light and receiver are not small. Divide by the
         smaller one elsewhere: for a light seen nearly edge-on, or a sliver above the horizon.
     """
-    vertices, p = shape.vertices.T[:, :, None], points.T
-    result = _precise_contour(vertices, p[:, None, :], vertices, vertices[:, :1], normals.T)
+    vertices, p = shape.vertices.T[:, :, None], np.ascontiguousarray(points.T)
+    seen = _precise_contour(vertices, p[:, None, :], vertices, normals.T)
 
-    # From behind, the vertices go round the other way.
-    value = np.abs(result.value) if two_sided else np.maximum(result.value, 0)
-    w = shape.normal[:, None]
+    w = shape.normal
     away = p - vertices[:, 0]
-    height = (w * away).sum(axis=0)
-    value[height == 0 if two_sided else height <= 0] = 0
+    height = _dot(w, away)
+    # From behind, the vertices go round the other way.
+    value = np.abs(seen.value) if two_sided else np.maximum(seen.value, 0.0)
+    value = np.where(height != 0 if two_sided else height > 0, value, 0.0)
     # So near to the plane that the side is uncertain, all may be wrong.
-    uncertain = np.abs(height) < _ROUNDINGS * _EPSILON * ((np.abs(w) + (w != 0)) * np.abs(away)).sum(axis=0)
-    return Bounded(value, np.where(uncertain, result.error + np.abs(result.value), result.error))
+    uncertain = np.abs(height) < _ROUNDINGS * _EPSILON * _dot(np.abs(w) + (w != 0), np.abs(away))
+    return Bounded(value, np.where(uncertain, seen.error + np.abs(seen.value), seen.error))
 
 
 def contour(offsets: Floats, normals: Floats, relative: Floats) -> Bounded:
@@ -84,178 +92,209 @@ def contour(offsets: Floats, normals: Floats, relative: Floats) -> Bounded:
     Bounded
         Shape (N,) [sr], clipped at the receivers' horizons.
     """
-    origin = np.zeros((3, 1, 1))
-    return _precise_contour(offsets.transpose(2, 1, 0), origin, relative.transpose(2, 1, 0), origin, normals.T)
+    return _precise_contour(offsets.transpose(2, 1, 0), np.zeros((3, 1, 1)), relative.transpose(2, 1, 0), normals.T)
 
 
-def _precise_contour(vertices: Floats, points: Floats, relative: Floats, origin: Floats, n: Floats) -> Bounded:
-    """As `contour`, for vertices (3, V, N or 1) seen from points (3, 1, N or 1), and relative ones from the origin."""
-    result = _contour(vertices - points, relative - origin, np.ascontiguousarray(n))
-    poor = result.error > _POOR * np.abs(result.value)
-    poor &= result.value != 0
-    if not poor.any() or np.finfo(np.longdouble).eps >= _EPSILON:
-        return result
+def _precise_contour(vertices: Floats, points: Floats, relative: Floats, normals: Floats) -> Bounded:
+    """As `contour`, for vertices and relative ones (3, V, N or 1), seen from points (3, 1, N or 1)."""
+    arguments = [np.ascontiguousarray(array) for array in (_closed(vertices), points, _closed(relative), normals)]
+    count = normals.shape[1]
+    value, error = np.empty(count), np.empty(count)
+    for part in chunks((count,), _AT_ONCE // (vertices.shape[1] + 1)):
+        here = _contour(*(array if array.shape[-1] == 1 else array[(..., *part)] for array in arguments))
+        value[part], error[part] = here
+    poor = np.flatnonzero(error > _POOR * np.abs(value))
+    poor = poor[value[poor] != 0]
+    if not len(poor) or np.finfo(np.longdouble).eps >= _EPSILON:
+        return Bounded(value, error)
 
     # Once more, with the longer numbers that many processors have; from the subtractions on, which round as well.
-    def longer(array: Floats) -> NDArray[np.longdouble]:
-        return (array if array.shape[-1] == 1 else array[..., poor]).astype(np.longdouble)
-
-    m = n[:, poor].astype(np.longdouble)
-    m /= np.sqrt((m**2).sum(axis=0))
-    again = _contour(longer(vertices) - longer(points), longer(relative) - longer(origin), m)
-    result.value[poor], result.error[poor] = again.value, again.error + _EPSILON / 2 * np.abs(again.value)
-    return result
+    longer = [_some(array, poor).astype(np.longdouble) for array in arguments]
+    longer[-1] /= np.sqrt(_dot(longer[-1], longer[-1]))
+    value[poor], still = _contour(*longer)
+    error[poor] = still + _EPSILON / 2 * np.abs(value[poor])
+    return Bounded(value, error)
 
 
-def _contour(offsets: Reals, relative: Reals, n: Reals) -> Bounded:
-    """As `contour`, with vectors first: offsets (3, V, N), relative (3, V, N or 1), n (3, N)."""
-    heights = n[0] * offsets[0] + n[1] * offsets[1] + n[2] * offsets[2]
-    below = (heights <= 0).all(axis=0)
-    whole = (heights >= 0).all(axis=0) & ~below
-    centered = relative - relative.mean(axis=1, keepdims=True)
-    size_squared = (centered**2).sum(axis=0).max(axis=0)
+def _contour(vertices: Reals, points: Reals, relative: Reals, n: Reals) -> tuple[Reals, Reals]:
+    """Values and bounds (N,) as of `_precise_contour`, for closed outlines and in the numbers that it gets."""
+    offsets = vertices - points
+    heights = _dot(n[:, None], offsets)
+    centered = relative - relative[:, :-1].sum(axis=1, keepdims=True) / (relative.shape[1] - 1)
     center = offsets[:, 0] - centered[:, 0]
-    far = size_squared < _FAR * (center[0] ** 2 + center[1] ** 2 + center[2] ** 2)
+    above = heights.max(axis=0) > 0
+    far = _dot(centered, centered).max(axis=0) < _FAR * _dot(center, center)
 
+    arguments = offsets, centered, heights, n
     value, error = np.zeros(n.shape[1], n.dtype), np.zeros(n.shape[1], n.dtype)
-    for is_far in (True, False):
-        for is_whole in (True, False):
-            which = ~below & (far == is_far) & (whole == is_whole)
-            if not which.any():
-                continue
-            everyone = which.all()
-            o, z, m = (offsets, heights, n) if everyone else (offsets[:, :, which], heights[:, which], n[:, which])
-            c = centered if everyone or centered.shape[2] == 1 else centered[:, :, which]
-            if is_far:
-                part = _far_contour(o[:, 0] - c[:, 0], c if is_whole else _clip(c, z), m)
-            else:
-                part = _near_contour(o, c, None if is_whole else z, m)
-            value[which], error[which] = part.value, part.error
-    return Bounded(value, error)  # type: ignore[arg-type]  # longer numbers stay within this module
+    for form, which in ((_near_contour, np.flatnonzero(above & ~far)), (_far_contour, np.flatnonzero(above & far))):
+        if len(which) == n.shape[1]:
+            return form(*arguments)
+        if len(which):
+            value[which], error[which] = form(*(_some(array, which) for array in arguments))
+    return value, error
 
 
-def _clip(relative: Reals, heights: Reals) -> Reals:
-    """The part of each polygon above the horizon, with twice as many vertices, many of them repeated.
+def _near_contour(offsets: Reals, centered: Reals, heights: Reals, n: Reals) -> tuple[Reals, Reals]:
+    """Sum over the edges of angle times axis."""
+    count = n.shape[1]
+    start, end, edges = offsets[:, :-1], offsets[:, 1:], centered[:, 1:] - centered[:, :-1]
+    squared = _dot(offsets, offsets)
+    axes = _cross(start, edges)
+    # Both ends give the same axis; one that is much nearer loses fewer digits.
+    nearer = np.flatnonzero(squared[:-1] > 4 * squared[1:])
+    if len(nearer):
+        axes.reshape(3, -1)[:, nearer] = _cross(_take(offsets, nearer + count, count), _take(edges, nearer, count))
+    moments, sines, cosines = _dot(n[:, None], axes), np.sqrt(_dot(axes, axes)), _dot(start, end)
+    magnitudes = np.sqrt(np.minimum(squared[:-1], squared[1:]))
+    magnitudes *= np.sqrt(_dot(edges, edges))
 
-    Follows Sutherland and Hodgman (1974). Pieces of a polygon that is not convex stay connected along the horizon, by
-    edges that are passed in both directions and cancel.
-    """
-    count = heights.shape[0]
-    is_above = heights >= 0
-    vertices: list[Reals] = []
-    for i in range(count):
-        j = (i + 1) % count
-        crosses = is_above[i] != is_above[j]
-        t = heights[i] / np.where(crosses, heights[i] - heights[j], 1.0)
-        crossing = relative[:, i] + t * (relative[:, j] - relative[:, i])
-        vertices += [np.broadcast_to(relative[:, i], crossing.shape), crossing]
-    used = np.empty((2 * count, heights.shape[1]), dtype=np.bool_)
-    used[::2] = is_above
-    used[1::2] = is_above != np.roll(is_above, -1, axis=0)
-    # Vertices that are not used repeat the one before; the last used one comes before the first.
-    latest = np.maximum.accumulate(np.where(used, np.arange(2 * count)[:, None], -1), axis=0)
-    latest = np.where(latest < 0, latest[-1], latest)
-    clipped: Reals = np.stack(vertices, axis=1)[:, latest, np.arange(heights.shape[1])]
-    return clipped
-
-
-def _near_contour(offsets: Reals, relative: Reals, heights: Reals | None, n: Reals) -> Bounded:
-    """Sum over the edges of angle times axis; if heights are given, clipped where they change their sign."""
-    edges = np.roll(relative, -1, axis=1) - relative
-    lengths = np.sqrt(edges[0] ** 2 + edges[1] ** 2 + edges[2] ** 2)
-    squared = offsets[0] ** 2 + offsets[1] ** 2 + offsets[2] ** 2
-    count = offsets.shape[1]
-    total, magnitude = np.zeros(n.shape[1], n.dtype), np.zeros(n.shape[1], n.dtype)
-    crossings: list[tuple[Reals, Reals]] = []
-    for i in range(count):
-        j = (i + 1) % count
-        ex, ey, ez = edges[:, i]
-        # Both ends give the same axis; the nearer one loses fewer digits.
-        nearer = squared[i] <= squared[j]
-        x, y, z = (np.where(nearer, component[i], component[j]) for component in offsets)
-        ax, ay, az = y * ez - z * ey, z * ex - x * ez, x * ey - y * ex
-        sine = np.sqrt(ax * ax + ay * ay + az * az)
-        start, end = offsets[:, i], offsets[:, j]
-        part: Reals | float = 1.0
-        if heights is not None:
-            start, end, part, crossing, passes_upwards = _edge_above(start, end, edges[:, i], heights[i], heights[j])
-            crossings.append((crossing, passes_upwards))
-        cosine = start[0] * end[0] + start[1] * end[1] + start[2] * end[2]
-        # An edge that points at the receiver, or has no length, subtends no angle.
-        angle = np.arctan2(part * sine, cosine) / np.where(sine == 0, 1.0, sine)
-        if heights is not None:
-            angle = np.where(part == 0, 0.0, angle)
-        total -= angle * (n[0] * ax + n[1] * ay + n[2] * az)
-        magnitude += angle * np.sqrt(np.minimum(squared[i], squared[j])) * lengths[i]
-    if crossings:
-        along, along_magnitude = _along_horizon(crossings, np.sqrt(squared.max(axis=0)), n)
-        total, magnitude = total - along, magnitude + along_magnitude
-    return Bounded(total / 2, _ROUNDINGS * np.finfo(n.dtype).eps / 2 * magnitude)
+    above = heights >= 0
+    cut = None if above.all() else _Crossings.of(offsets, heights, above)
+    if cut is not None:
+        sines.reshape(-1)[cut.edge] *= cut.part
+        cosines.reshape(-1)[cut.edge] = _dot(cut.inside, cut.points)
+    # An edge that points at the receiver, or has no length, subtends no angle.
+    factors = _angles(sines, cosines) / (sines + (sines == 0))
+    if cut is not None:
+        factors.reshape(-1)[cut.edge] *= cut.part
+        factors *= above[:-1] | above[1:]
+    moments *= factors
+    magnitudes *= factors
+    total, magnitude = moments.sum(axis=0), magnitudes.sum(axis=0)
+    if cut is not None:
+        owner, x, y, sign = cut.along_horizon()
+        sine = _dot(_some(n, owner), _cross(x, y))
+        np.add.at(total, owner, np.copysign(_angles(np.abs(sine), _dot(x, y)), sign * sine))
+        # Rounding displaces the crossings by ulps of the edge's distance.
+        farthest = np.maximum(squared.take(cut.edge), squared.take(cut.edge + count))
+        distance = _dot(cut.points, cut.points)
+        np.add.at(magnitude, cut.owner, 0.5 + 0.5 * np.sqrt(farthest / (distance + (distance == 0))))
+    return total / -2, _ROUNDINGS * np.finfo(n.dtype).eps / 2 * magnitude
 
 
-def _edge_above(
-    start: Reals, end: Reals, edge: Reals, z0: Reals, z1: Reals
-) -> tuple[Reals, Reals, Reals, Reals, Reals]:
-    """The part of edges above the horizon: start, end, fraction, crossing, and +1 or -1 if it leads up or down."""
-    upwards, downwards = (z0 < 0) & (z1 >= 0), (z0 >= 0) & (z1 < 0)
-    crosses = upwards | downwards
-    t = z0 / np.where(crosses, z0 - z1, 1.0)
-    crossing = start + t * edge
-    fraction = np.where(upwards, 1 - t, np.where(downwards, t, np.where(z0 < 0, 0.0, 1.0)))
-    start, end = np.where(upwards, crossing, start), np.where(downwards, crossing, end)
-    return start, end, fraction, crossing, upwards * 1.0 - downwards
-
-
-def _along_horizon(crossings: list[tuple[Reals, Reals]], extent: Reals, n: Reals) -> tuple[Reals, Reals]:
-    """Angles that close the contours along the horizon, and how much rounding may turn them, in units of eps.
-
-    All crossings lie on one line, so that their angles from any one of them stay below pi.
-    """
-    reference = np.zeros_like(crossings[0][0])
-    for crossing, sign in crossings:
-        unset = (reference == 0).all(axis=0) & (sign != 0)
-        reference = np.where(unset, crossing, reference)
-    total, magnitude = np.zeros(n.shape[1], n.dtype), np.zeros(n.shape[1], n.dtype)
-    x, y, z = reference
-    for (cx, cy, cz), sign in crossings:
-        sine = n[0] * (y * cz - z * cy) + n[1] * (z * cx - x * cz) + n[2] * (x * cy - y * cx)
-        total += np.where(sign != 0, sign * np.arctan2(sine, x * cx + y * cy + z * cz), 0.0)
-        distance = np.sqrt(cx * cx + cy * cy + cz * cz)
-        magnitude += np.where(sign != 0, 1 + extent / np.where(distance == 0, 1.0, distance), 0.0)
-    return total, magnitude
-
-
-def _far_contour(center: Reals, centered: Reals, n: Reals) -> Bounded:
+def _far_contour(offsets: Reals, centered: Reals, heights: Reals, n: Reals) -> tuple[Reals, Reals]:
     """Difference form: 1/r_c^2 times the projected area, and a sum over the edges of g_i times their axes."""
-    edges = np.roll(centered, -1, axis=1) - centered
-    lengths_squared = edges[0] ** 2 + edges[1] ** 2 + edges[2] ** 2
-    spread = (np.sqrt(lengths_squared) * np.sqrt((centered**2).sum(axis=0))).sum(axis=0)
-    count = centered.shape[1]
-    rc2 = center[0] ** 2 + center[1] ** 2 + center[2] ** 2
-    rc = np.sqrt(rc2)
+    seen = _Distant.of(offsets[:, 0] - centered[:, 0], n)
+    distances, differences = seen.distances(centered)
+    starts, ends = (distances[:-1], differences[:-1]), (distances[1:], differences[1:])
+    terms, magnitudes = seen.terms(centered[:, :-1], centered[:, 1:] - centered[:, :-1], starts, ends)
 
-    # Distances of the vertices, as differences d from that of the centre.
-    vertices = [center + centered[:, i] for i in range(count)]
-    r, d = [], []
-    for i, (x, y, z) in enumerate(vertices):
-        radius = np.sqrt(x * x + y * y + z * z)
-        u = centered[:, i]
-        r.append(radius)
-        d.append((u[0] * (x + center[0]) + u[1] * (y + center[1]) + u[2] * (z + center[2])) / (radius + rc))
+    above = heights >= 0
+    cut = None if above.all() else _Crossings.of(centered, heights, above)
+    if cut is not None:
+        visible = above[:-1] | above[1:]
+        terms, magnitudes = terms * visible, magnitudes * visible
+        part, size = seen.of_receivers(cut.owner).segments(cut.inside, cut.points)
+        terms.reshape(-1)[cut.edge] = np.where(cut.rises, -part, part)
+        magnitudes.reshape(-1)[cut.edge] = size
+    total, magnitude = terms.sum(axis=0), magnitudes.sum(axis=0)
+    if cut is not None:
+        owner, x, y, sign = cut.along_horizon()
+        part, size = seen.of_receivers(owner).segments(x, y)
+        np.add.at(total, owner, sign * part)
+        np.add.at(magnitude, owner, size)
+    return total / -2, _ROUNDINGS * np.finfo(n.dtype).eps / 2 * magnitude / seen.squared
 
-    area_x, area_y, area_z = np.cross(centered, edges, axis=0).sum(axis=1)
-    total = (n[0] * area_x + n[1] * area_y + n[2] * area_z) / rc2
-    for i in range(count):
-        j = (i + 1) % count
-        x, y, z = vertices[i]
-        ex, ey, ez = edges[:, i]
-        ax, ay, az = y * ez - z * ey, z * ex - x * ez, x * ey - y * ex
-        product = r[i] * r[j]
+
+@dataclass(frozen=True, eq=False)
+class _Crossings:
+    """Where outlines pass through the horizon."""
+
+    edge: Integers
+    """The edges that do so, as indices into flattened arrays (V, N); shape (K,)."""
+    owner: Integers
+    """The receivers whose horizons they are, shape (K,)."""
+    rises: Booleans
+    """Whether the edge leads upwards, shape (K,)."""
+    inside: Reals
+    """The edge's end above the horizon, shape (3, K)."""
+    points: Reals
+    """The crossings, shape (3, K)."""
+    part: Reals
+    """How much of the edge is above the horizon, shape (K,)."""
+
+    @classmethod
+    def of(cls, vertices: Reals, heights: Reals, above: Booleans) -> _Crossings:
+        """Crossings of closed outlines (3, V + 1, N or 1)."""
+        count = heights.shape[1]
+        edge = np.flatnonzero(above[:-1] != above[1:])
+        rises = ~above.take(edge)
+        upper = edge + count * rises
+        lower = 2 * edge + count - upper
+        inside, points = _take(vertices, upper, count), _take(vertices, lower, count)
+        high, low = heights.take(upper), heights.take(lower)
+        part = high / (high - low)
+        points -= inside
+        points *= part
+        points += inside
+        return cls(edge, edge - edge // count * count, rises, inside, points, part)
+
+    def along_horizon(self) -> tuple[Integers, Reals, Reals, Reals]:
+        """What closes the outlines: receivers (M,), from where to where along their horizons (3, M), and signs (M,).
+
+        Instead of going from each point of descent to the next ascent, the ways lead from one point of descent to each
+        ascent, and with the sign -1 to each other descent. All crossings of a receiver lie on one line, so that the
+        angles stay below pi.
+        """
+        descents = np.flatnonzero(~self.rises)
+        chosen = np.empty(self.owner.max() + 1, np.intp)
+        chosen[self.owner.take(descents)] = descents
+        first = chosen.take(self.owner)
+        second = np.flatnonzero(first != np.arange(len(first)))
+        first = first.take(second)
+        sign = np.where(self.rises.take(second), 1.0, -1.0)
+        return self.owner.take(second), self.points.take(first, axis=1), self.points.take(second, axis=1), sign
+
+
+@dataclass(frozen=True, eq=False)
+class _Distant:
+    """Polygons' centres as distant receivers see them, shape (3, N), and what is derived from them."""
+
+    center: Reals
+    squared: Reals
+    distance: Reals
+    n: Reals
+    across: Reals
+    """The receivers' normals times the centres."""
+
+    @classmethod
+    def of(cls, center: Reals, n: Reals) -> _Distant:
+        squared = _dot(center, center)
+        return cls(center, squared, np.sqrt(squared), n, _cross(n, center))
+
+    def of_receivers(self, which: Integers) -> _Distant:
+        return _Distant(*(_some(a, which) for a in (self.center, self.squared, self.distance, self.n, self.across)))
+
+    def distances(self, relative: Reals) -> tuple[Reals, Reals]:
+        """Distances (V, N) of points (3, V, N or 1) given from the centre, and how much larger than its they are."""
+        more = 2 * _dot(relative, self.center[:, None])
+        more += _dot(relative, relative)
+        distance = np.sqrt(self.squared + more)
+        return distance, more / (distance + self.distance)
+
+    def terms(
+        self, start: Reals, edges: Reals, starts: tuple[Reals, Reals], ends: tuple[Reals, Reals]
+    ) -> tuple[Reals, Reals]:
+        """The edges' parts (V, N) of the sum and their magnitudes; `starts` and `ends` are their ends' `distances`."""
+        (r, d), (s, e) = starts, ends
+        lengths_squared = _dot(edges, edges)
+        product = r * s
         # By the chord, the sine of half the angle is precise; |e|^2 = (r_i - r_j)^2 + 4 r_i r_j sin^2(theta/2).
-        half_sine_squared = (lengths_squared[i] - (d[i] - d[j]) ** 2) / (4 * product)
-        g = (_angle_over_sine(half_sine_squared) - (rc * (d[i] + d[j]) + d[i] * d[j]) / rc2) / product
-        total += g * (n[0] * ax + n[1] * ay + n[2] * az)
-    return Bounded(-total / 2, _ROUNDINGS * np.finfo(n.dtype).eps / 2 * spread / rc2)
+        half_sine_squared = (lengths_squared - (d - e) ** 2) / (4 * product)
+        g = _angle_over_sine(half_sine_squared)
+        g -= (self.distance * (d + e) + d * e) / self.squared
+        g /= product
+        area = _dot(self.n[:, None], _cross(start, edges))
+        g *= area + _dot(self.across[:, None], edges)
+        g += area / self.squared
+        return g, np.sqrt(lengths_squared * _dot(start, start))
+
+    def segments(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
+        """`terms` (N,) of one edge (3, N) for each receiver."""
+        start, end = start[:, None], end[:, None]
+        terms, magnitudes = self.terms(start, end - start, self.distances(start), self.distances(end))
+        return terms[0], magnitudes[0]
 
 
 # theta/sin(theta) - 1 in powers of q = sin^2(theta/2): with asin(s)/(s sqrt(1-s^2)) = sum (4 q)^k / ((2k+1) C(2k,k)).
@@ -266,7 +305,48 @@ for _k in range(1, 13):
 
 def _angle_over_sine(q: Reals) -> Reals:
     """``theta/sin(theta) - 1`` of angles with ``q = sin^2(theta/2)``, up to 0.35 rad."""
-    result = np.full_like(q, _SERIES[-1])
+    result = q * _SERIES[-1]
     for coefficient in reversed(_SERIES[1:-1]):
-        result = coefficient + q * result
-    return q * result
+        result += coefficient
+        result *= q
+    return result
+
+
+def _angles(sines: Reals, cosines: Reals) -> Reals:
+    """Angles from 0 to pi by multiples of their sines and cosines: as arctan2, in half its time."""
+    result: Reals = np.arctan(sines / (cosines + _NOTHING))
+    result += (cosines < 0) * np.arccos(result.dtype.type(-1))
+    return result
+
+
+def _closed(outlines: Floats) -> Floats:
+    return np.concatenate([outlines, outlines[:, :1]], axis=1)
+
+
+def _some(array: Reals, receivers: Integers) -> Reals:
+    """What belongs to some receivers, of an array with the last axis N or 1."""
+    return array if array.shape[-1] == 1 else array.take(receivers, axis=-1)
+
+
+def _take(vectors: Reals, index: Integers, count: int) -> Reals:
+    """Vectors (3, K) from an array (3, V, N or 1), by indices into flattened arrays (V, N)."""
+    return vectors.reshape(3, -1).take(index // count if vectors.shape[2] == 1 else index, axis=1)
+
+
+def _dot(a: Reals, b: Reals) -> Reals:
+    """Scalar product over the first axis."""
+    result: Reals = a[0] * b[0]
+    result += a[1] * b[1]
+    result += a[2] * b[2]
+    return result
+
+
+def _cross(a: Reals, b: Reals) -> Reals:
+    """Cross product over the first axis."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    x = ay * bz
+    result = np.empty((3, *x.shape), x.dtype)
+    np.subtract(x, az * by, out=result[0])
+    np.subtract(az * bx, ax * bz, out=result[1])
+    np.subtract(ax * by, ay * bx, out=result[2])
+    return result
