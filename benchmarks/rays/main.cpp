@@ -171,16 +171,18 @@ int main(int argc, char** argv) {
     const size_t triangles = size_t(n) * size_t(n) * 34 + 2;
     const Sensor sensor{Sensor::Kind::perspective, {0.5f, -1.4f, 0.5f}, {0, 1, 0}, {0.72f, 0, 0}, {0, 0, -0.72f}};
     const Film film{size, size, 0};
-    constexpr uint32_t spp = 32;
+    constexpr uint32_t spp = 64;
 
     // Record once, on this thread.
     std::vector<Recorded> rays;
     recorder = &rays;
     for (int y = 0; y < size; ++y)
         for (int x = 0; x < size; ++x) {
-            Color results[spp];
-            const Sampler sampler(SamplerKind::sobol, 1, uint32_t(y * size + x), 0, 8);
-            measure(recorded, sensor, film, {Strategy::mis, 0, 7}, x, y, sampler, spp, results);
+            for (uint32_t first = 0; first < spp; first += batch) {
+                Color results[batch];
+                const Sampler sampler(SamplerKind::sobol, 1, uint32_t(y * size + x), first, batch, 8);
+                measure(recorded, sensor, film, {Strategy::mis, 0, 7}, x, y, sampler, batch, results);
+            }
         }
     recorder = nullptr;
     size_t occlusions = 0;

@@ -7,3 +7,12 @@
 #else
 #define ORACLE_FOR_WIDE_VECTORS
 #endif
+
+// Before a loop whose iterations do not touch each other's data.
+#if defined(__clang__)
+#define ORACLE_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#elif defined(__GNUC__)
+#define ORACLE_INDEPENDENT _Pragma("GCC ivdep")
+#else
+#define ORACLE_INDEPENDENT
+#endif

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "diffuse.h"
+
 namespace oracle {
 namespace {
 
@@ -45,6 +47,7 @@ struct Vertex {
     Frame frame;     // shading frame; in a medium, z is where the path came from
     Bsdf bsdf;
     Vec3 to_eye;     // local
+    int few;         // the surface, as `Surface::few` names it
 
     Color evaluate(const Scene& scene, const Vec3& world) const {
         if (kind == Kind::medium) return phase_function(scene.asymmetry, -dot(frame.z, world)) * white();
@@ -128,7 +131,8 @@ Connection sample_direct(const Scene& scene, const Vertex& vertex, Strategy stra
 
     const float pdf = s.pdf * probability;
     const float weight = strategy == Strategy::mis && !alone ? balance(pdf, vertex.pdf(scene, s.direction)) : 1;
-    Connection result{vertex.leave(s.direction), s.direction, s.distance, weight / pdf * f * s.light};
+    Connection result{vertex.leave(s.direction), s.direction, s.distance, weight / pdf * f * s.light, vertex.few};
+    if (!environment) result.end = scene.lights[size_t(chosen)].few;
     if (scene.has_medium) result.light *= transmittance(scene, s.distance);
     // From beside the one surface to beside the other.
     if (std::isfinite(s.distance)) {
@@ -189,20 +193,25 @@ struct Draw {
     float choice, roulette;
 };
 
-// The numbers of the same step of all paths of a batch: two blocks of the sampler, the second one only if it is needed.
+// The numbers of the same step of all paths of a batch: three blocks of the sampler, the later ones if they are needed.
 struct Draws {
     Block first, second;
+    float roulette[batch];
 
     Draws(const Scene& scene, const Sampler& sampler, uint32_t step) {
-        sampler.draw(2 * step + 1, first);
-        if (scene.needs_choices || int(step) + 1 >= roulette_from)
-            sampler.draw(2 * step + 2, second);
+        sampler.draw(3 * step + 1, first);
+        if (scene.needs_choices)
+            sampler.draw(3 * step + 2, second);
         else
             second = {};
+        if (int(step) + 1 >= roulette_from)
+            sampler.draw_alone(3 * step + 3, roulette);
+        else
+            std::fill_n(roulette, batch, 0.0f);
     }
 
     Draw of(int i) const {
-        return {{first.a[i], first.b[i]}, {first.c[i], first.d[i]}, {second.c[i], second.d[i]}, second.a[i], second.b[i]};
+        return {{first.a[i], first.b[i]}, {first.c[i], first.d[i]}, {second.c[i], second.d[i]}, second.a[i], roulette[i]};
     }
 };
 
@@ -238,13 +247,14 @@ bool scatter(const Scene& scene, const Method& method, Path& path, const Vertex&
         }
     }
     path.from = vertex.p;
-    path.ray = {vertex.leave(next.to_light), next.to_light};
+    path.ray = {vertex.leave(next.to_light), next.to_light, vertex.few};
     return true;
 }
 
-// What the path finds where its ray leads: `s`, or nothing if not `hit`. False if it ends there.
+// What the path finds where its ray leads: `s`, or nothing if not `hit`. False if it ends there, or is left to be followed
+// with the other `diffuse` vertices, if there are any.
 bool arrive(const Scene& scene, const Method& method, Path& path, bool hit, Surface& s, const Draw& draw,
-            Connection& connection) {
+            Connection& connection, DiffuseVertices* diffuse) {
     const Vec3 back = -path.ray.direction;
     if (scene.has_medium) {
         float distance;
@@ -254,7 +264,7 @@ bool arrive(const Scene& scene, const Method& method, Path& path, bool hit, Surf
         if (scattered) {
             if (path.bounce >= method.bounces) return false;
             const Vec3 p = path.ray.origin + distance * path.ray.direction;
-            const Vertex vertex{Vertex::Kind::medium, p, {}, distance, Frame(back), scene.bsdf(s, 0), {0, 0, 1}};
+            const Vertex vertex{Vertex::Kind::medium, p, {}, distance, Frame(back), scene.bsdf(s, 0), {0, 0, 1}, Few::none};
             return scatter(scene, method, path, vertex, draw, connection);
         }
     }
@@ -278,14 +288,47 @@ bool arrive(const Scene& scene, const Method& method, Path& path, bool hit, Surf
         material = front ? sides.first : sides.second;
         if (!front) s.shading = -s.shading;
     }
-    const Frame frame(s.shading);
     const Bsdf bsdf = scene.bsdf(s, material);
     const float reach = std::max(s.distance, s.extent);
     // Rounding may have put the point behind another surface where two meet, but back along the ray there is none. Light
     // that is let through needs it where it is.
-    const Vec3 p = bsdf.transmits() ? s.p : s.p + rounding(s.p, s.distance) * back;
-    const Vertex vertex{Vertex::Kind::surface, p, s.normal, reach, frame, bsdf, frame.to_local(back)};
+    const Vec3 before = s.p + rounding(s.p, s.distance) * back;
+    if (diffuse && bsdf.material.kind == Material::Kind::diffuse) {
+        const Color throughput = path.throughput * bsdf.material.reflectance.at(scene.textures, s.uv);
+        diffuse->add({before, s.normal, s.shading, back, reach, throughput, path.bent, draw.light, draw.direction, draw.roulette});
+        return false;
+    }
+    const Vec3 p = bsdf.transmits() ? s.p : before;
+    const Frame frame(s.shading);
+    const Vertex vertex{Vertex::Kind::surface, p, s.normal, reach, frame, bsdf, frame.to_local(back), s.few};
     return scatter(scene, method, path, vertex, draw, connection);
+}
+
+// The same for many diffuse vertices. The k-th one is at the surface `slots[k]`, whose path is `owners[slots[k]]`.
+void scatter(const Scene& scene, const Method& method, DiffuseVertices& vertices, const int* slots, const int* owners,
+             Path* paths, const Surface* surfaces, Connection* connections, int* alive, int& living) {
+    const int bounce = paths[owners[slots[0]]].bounce + 1;
+    if (bounce >= method.first_bounce) {
+        vertices.connect(scene);
+        for (int k = 0; k < vertices.size(); ++k) {
+            Connection& c = connections[slots[k]];
+            c = vertices.connection(k);
+            c.begin = surfaces[slots[k]].few, c.end = scene.lights[size_t(vertices.chosen[k])].few;
+        }
+    }
+    // The last ray would find nothing that was not sampled.
+    if (bounce == method.bounces && scene.environment.kind == Environment::Kind::none) return;
+    vertices.reflect(bounce >= roulette_from, bounce >= roulette_for_all_from ? longest_survival : 1);
+    for (int k = 0; k < vertices.size(); ++k) {
+        Path& path = paths[owners[slots[k]]];
+        path.throughput = vertices.throughput[k];
+        if (is_black(path.throughput)) continue;
+        path.ray = {vertices.origin[k], vertices.outgoing[k], surfaces[slots[k]].few};
+        path.from = vertices.position(k);
+        path.pdf = vertices.pdf[k], path.delta = false, path.diffuse = true;
+        path.bounce = bounce;
+        alive[living++] = owners[slots[k]];
+    }
 }
 
 // An irradiance meter is a first vertex, at which light is reflected once more than is counted.
@@ -294,7 +337,7 @@ bool begin_at_meter(const Scene& scene, const Method& method, const Sensor& sens
     path.bounce = -1;
     const Vec3 p = sensor.point(position);
     const Surface nothing{};
-    const Vertex vertex{Vertex::Kind::meter, p, sensor.forward, 0, Frame(sensor.forward), scene.bsdf(nothing, 0), {}};
+    const Vertex vertex{Vertex::Kind::meter, p, sensor.forward, 0, Frame(sensor.forward), scene.bsdf(nothing, 0), {}, Few::none};
     return scatter(scene, method, path, vertex, draw, connection);
 }
 
@@ -318,6 +361,11 @@ void measure(const Scene& scene, const Sensor& sensor, const Film& film, const M
     // The paths that go on.
     int alive[batch], living = 0;
     bool blocked[batch];
+
+    // Diffuse surfaces are left for the end of each step, if that serves them.
+    const bool is_plain = method.strategy == Strategy::mis && !scene.has_medium && scene.has_few_patches();
+    DiffuseVertices diffuse;
+    int diffuse_slots[batch];
 
     Block film_block;
     sampler.draw(0, film_block);
@@ -347,11 +395,15 @@ void measure(const Scene& scene, const Sensor& sensor, const Film& film, const M
         const int arrived = living;
         int owners[batch];
         living = 0;
+        diffuse.clear();
         for (int k = 0; k < arrived; ++k) {
-            const int i = owners[k] = alive[k];
+            const int i = owners[k] = alive[k], before = diffuse.size();
             connections[k].light = {};
-            if (arrive(scene, method, paths[i], hits[k], surfaces[k], draws.of(i), connections[k])) alive[living++] = i;
+            if (arrive(scene, method, paths[i], hits[k], surfaces[k], draws.of(i), connections[k], is_plain ? &diffuse : nullptr))
+                alive[living++] = i;
+            if (diffuse.size() > before) diffuse_slots[before] = k;
         }
+        if (diffuse.size() > 0) scatter(scene, method, diffuse, diffuse_slots, owners, paths, surfaces, connections, alive, living);
         scene.blocked(connections, arrived, together, blocked);
         for (int k = 0; k < arrived; ++k)
             if (!blocked[k]) paths[owners[k]].result += connections[k].light;

@@ -7,87 +7,7 @@ namespace {
 
 using Kind = Light::Kind;
 
-// Above this ratio of area to squared distance from the center, the solid angle is sampled instead of the area.
-constexpr float near = 0.1f;
-
-bool is_near(const Light& l, const Vec3& from) {
-    return l.area > near * length_squared(l.center - from);
-}
-
-// A rectangle as seen from a point, in the coordinates of its edges (Ureña, Fajardo and King 2013).
-struct SphericalRectangle {
-    float x0, y0, x1, y1, z;  // corners; z > 0 is the distance of the plane
-    float b0, b1, k, solid_angle;
-
-    SphericalRectangle(const Light& l, const Vec3& from) {
-        const float width = length(l.u), height = length(l.v);
-        const Vec3 d = l.p - from;
-        x0 = dot(d, l.u) / width, y0 = dot(d, l.v) / height, z = std::fabs(dot(d, l.n));
-        x1 = x0 + width, y1 = y0 + height;
-        // The planes through the eye and each edge enclose these angles. Their sines come from the corners' distances, for
-        // an arc cosine would lose the digits of angles near 0 and pi, which is what they are near the rectangle's plane.
-        const auto over = [&](float a) { return 1 / std::sqrt(a * a + z * z); };
-        const float u0 = over(x0), u1 = over(x1), v0 = over(y0), v1 = over(y1);
-        const auto angle = [&](float x, float y, float u, float v, float sign) {
-            return Vec2{sign * (x * u) * (y * v), z * u * v * std::sqrt(x * x + y * y + z * z)};
-        };
-        const auto sum = [](const Vec2& a, const Vec2& b) { return Vec2{a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x}; };
-        const auto radians = [](const Vec2& a) {
-            const float r = std::atan2(a.y, a.x);
-            return r < 0 ? r + 2 * pi : r;
-        };
-        const Vec2 right = sum(angle(x1, y0, u1, v0, 1), angle(x1, y1, u1, v1, -1));
-        const Vec2 left = sum(angle(x0, y1, u0, v1, 1), angle(x0, y0, u0, v0, -1));
-        b0 = -y0 * v0, b1 = y1 * v1;
-        k = 2 * pi - radians(left);
-        solid_angle = radians(sum(right, left));
-    }
-
-    // As fractions of the edges.
-    Vec2 sample(const Vec2& u) const {
-        const float au = u.x * solid_angle + k;
-        const float fu = (std::cos(au) * b0 - b1) / std::sin(au);
-        const float cu = std::clamp(std::copysign(1 / std::sqrt(fu * fu + b0 * b0), fu), -1.0f, 1.0f);
-        const float x = std::clamp(cu * z / safe_sqrt(1 - cu * cu), x0, x1);
-        const float d2 = x * x + z * z;
-        const float h0 = y0 / std::sqrt(d2 + y0 * y0), h1 = y1 / std::sqrt(d2 + y1 * y1);
-        const float h = h0 + u.y * (h1 - h0);
-        const float y = h * h < 1 - 1e-6f ? std::clamp(h * std::sqrt(d2) / std::sqrt(1 - h * h), y0, y1) : y1;
-        return {(x - x0) / (x1 - x0), (y - y0) / (y1 - y0)};
-    }
-};
-
-// A triangle as seen from a point (Arvo 1995, "Stratified Sampling of Spherical Triangles").
-struct SphericalTriangle {
-    Vec3 a, b, c;
-    float solid_angle, alpha;
-
-    SphericalTriangle(const Light& l, const Vec3& from) {
-        const Vec3 d = l.p - from, e = d + l.u, f = d + l.v;
-        const float da = length(d), db = length(e), dc = length(f);
-        a = d / da, b = e / db, c = f / dc;
-        // van Oosterom and Strackee 1983; the triple product by the distance of the plane, which does not cancel.
-        const float triple = 2 * l.area * std::fabs(dot(d, l.n)) / (da * db * dc);
-        solid_angle = 2 * std::atan2(triple, 1 + dot(a, b) + dot(b, c) + dot(c, a));
-        const Vec3 ab = cross(a, b), ac = cross(a, c);
-        alpha = std::atan2(triple, dot(ab, ac));
-    }
-
-    Vec3 sample(const Vec2& u) const {
-        const float area = u.x * solid_angle;
-        const float s = std::sin(area - alpha), t = std::cos(area - alpha);
-        const float cos_alpha = std::cos(alpha), sin_alpha = std::sin(alpha), cos_c = dot(a, b);
-        const float p = t - cos_alpha, q = s + sin_alpha * cos_c;
-        const float numerator = (q * t - p * s) * cos_alpha - q, denominator = (q * s + p * t) * sin_alpha;
-        const float cos_b = denominator == 0 ? 1 : std::clamp(numerator / denominator, -1.0f, 1.0f);
-        const Vec3 towards = c - dot(c, a) * a;
-        const Vec3 moved = cos_b * a + safe_sqrt(1 - cos_b * cos_b) * normalize(towards);
-        const float z = 1 - u.y * (1 - dot(moved, b));
-        const Vec3 across = moved - dot(moved, b) * b;
-        const float l = length(across);
-        return l == 0 ? b : z * b + safe_sqrt(1 - z * z) / l * across;
-    }
-};
+bool is_near(const Light& l, const Vec3& from) { return is_near(l.area, l.center, from); }
 
 // 1 - cos of the half angle of the cone that a sphere fills, without cancellation.
 float one_minus_cosine(const Light& l, float distance_squared) {
@@ -146,38 +66,12 @@ float spot_falloff(const Light& l, float cosine) {
 
 LightSample sample_light(const Light& l, const std::vector<Texture>& textures, const Vec3& from, const Vec2& u) {
     switch (l.kind) {
-        case Kind::rectangle: {
+        case Kind::rectangle:
+        case Kind::triangle: {
             // From behind there is nothing to compute.
             if (!l.two_sided && dot(from - l.p, l.n) <= 0) return {};
-            if (is_near(l, from)) {
-                const SphericalRectangle seen(l, from);
-                if (!(seen.solid_angle > 0)) return {};
-                const Vec2 at = seen.sample(u);
-                return towards(l, from, l.p + at.x * l.u + at.y * l.v, l.n, emitted(l, textures, at.x, at.y), 1 / seen.solid_angle);
-            }
-            return towards(l, from, l.p + u.x * l.u + u.y * l.v, l.n, emitted(l, textures, u.x, u.y));
-        }
-        case Kind::triangle: {
-            if (!l.two_sided && dot(from - l.p, l.n) <= 0) return {};
-            if (is_near(l, from)) {
-                const SphericalTriangle seen(l, from);
-                if (!(seen.solid_angle > 0)) return {};
-                const Vec3 w = seen.sample(u);
-                const float cosine = dot(w, l.n);
-                const float t = cosine == 0 ? 0 : dot(l.p - from, l.n) / cosine;
-                if (!(t > 0)) return {};
-                // By its fractions of the edges, so that rounding does not move it off the plane.
-                const Vec3 d = from + t * w - l.p, c = cross(l.u, l.v);
-                const float s = dot(cross(d, l.v), c) / dot(c, c), q = dot(cross(l.u, d), c) / dot(c, c);
-                return towards(l, from, l.p + s * l.u + q * l.v, l.n, emitted(l, textures, s, q), 1 / seen.solid_angle);
-            }
-            // Uniform in the triangle (Heitz 2019, "A Low-Distortion Map Between Triangle and Square").
-            float s, t;
-            if (u.y > u.x)
-                s = u.x / 2, t = u.y - s;
-            else
-                t = u.y / 2, s = u.x - t;
-            return towards(l, from, l.p + s * l.u + t * l.v, l.n, emitted(l, textures, s, t));
+            const PatchSample at = l.kind == Kind::rectangle ? sample_rectangle(l, from, u.x, u.y) : sample_triangle(l, from, u.x, u.y);
+            return towards(l, from, l.p + at.s * l.u + at.t * l.v, l.n, emitted(l, textures, at.s, at.t), at.pdf);
         }
         case Kind::disk: {
             if (!l.two_sided && dot(from - l.p, l.n) <= 0) return {};
@@ -227,9 +121,7 @@ float importance(const Light& l, const Vec3& from) {
     const float d2 = length_squared(l.center - from) + least;
     if (l.is_delta()) return l.brightness / d2 + least;
     if (l.kind == Kind::sphere) return l.brightness * pi * squared(l.radius) / std::max(d2, squared(l.radius)) + least;
-    // Behind a one-sided light there is none, and never more than from the whole hemisphere.
-    if (!l.two_sided && dot(from - l.p, l.n) <= 0) return least;
-    return l.brightness * std::min(l.area / d2, pi) + least;
+    return importance_of_patch(l, from);
 }
 
 }  // namespace oracle

@@ -1,20 +1,18 @@
 // Emitters of finite extent or power: how much light they send to a point, and how to choose a point on them.
 #pragma once
 
+#include "patch.h"
 #include "texture.h"
 #include "vec.h"
 
 namespace oracle {
 
-struct Light {
+// What is not flat has a center or a position p, and n is where a spot or parallel light shines; a disk's u and v are radii.
+struct Light : Patch {
     enum class Kind { triangle, rectangle, disk, sphere, point, spot, directional };
     Kind kind;
 
-    Vec3 p{};          // a corner, the center or the position
-    Vec3 u{}, v{};     // edges from the corner; for a disk its radii
-    Vec3 n{};          // unit normal of the front, or where a spot or parallel light shines
     float radius = 0;  // of a disk or sphere
-    float area = 0;
     float extent = 0;  // longest edge or radius, by whose rounding points on it are off
     Vec3 center{};     // of whatever has a surface
     float brightness = 0;  // mean of `light` over the channels
@@ -23,8 +21,10 @@ struct Light {
     ColorMap radiance; // of an area light
     Vec2 uv[3] = {};   // texture coordinates of the three corners p, p + u, p + v
     bool two_sided = false;
+    int few = -1;  // its surface among few, as `Surface::few` names it
 
     bool is_delta() const { return kind >= Kind::point; }
+    bool is_patch() const { return kind <= Kind::rectangle; }
 };
 
 struct LightSample {
@@ -47,6 +47,18 @@ float light_pdf(const Light& light, const Vec3& from, const Vec3& direction, flo
 // Whether `sample_light` spreads its samples about evenly over the light as it looks from `from`: what a diffuse surface
 // then makes of them is bounded.
 bool is_sampled_evenly(const Light& light, const Vec3& from);
+
+// Where there are no more lights than this, each of them is looked at to choose one.
+constexpr size_t few_lights = 16;
+
+// `importance` of a rectangle or triangle.
+inline float importance_of_patch(const Light& light, const Vec3& from) {
+    const float d2 = length_squared(light.center - from) + 1e-30f;
+    const float shown = light.brightness * smaller(light.area / d2, pi);
+    // Behind a one-sided light there is none, and never more than from the whole hemisphere.
+    const bool seen = light.two_sided | (dot(from - light.p, light.n) > 0);
+    return (seen ? shown : 0) + 1e-30f;
+}
 
 // About the irradiance that the light gives to a surface at `from` that faces it, with nothing in between; positive.
 float importance(const Light& light, const Vec3& from);

@@ -67,7 +67,7 @@ Defect render_pass(const Scene& scene, const Sensor& sensor, const Film& film, c
         for (uint32_t done = 0; done < pass.samples; done += batch) {
             const uint32_t first = pass.first_sample + done;
             const int count = int(std::min<uint32_t>(batch, pass.samples - done));
-            const Sampler sampler(pass.sampler, pass.seed, uint32_t(pixel), first, pass.replicates);
+            const Sampler sampler(pass.sampler, pass.seed, uint32_t(pixel), first, count, pass.replicates);
             Color results[batch];
             measure(scene, sensor, film, pass.method, x, y, sampler, count, results);
             for (int i = 0; i < count; ++i) {

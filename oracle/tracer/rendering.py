@@ -262,7 +262,7 @@ class Job:
             raise InvalidArgument("start: shows another scene, or was rendered otherwise")
         at = max([first_sample, *(one.first + one.count for one in rendering.ranges if one.seed == seed)])
         began = time.monotonic()
-        count = 2 * GROUP
+        count = 4 * GROUP
         while True:
             missing = goal.samples(rendering) - rendering.spp
             elapsed = time.monotonic() - began

@@ -1,5 +1,7 @@
 #include "sampler.h"
 
+#include <algorithm>
+
 #include "clones.h"
 
 namespace oracle {
@@ -52,8 +54,10 @@ inline float to_unit(uint32_t x) { return static_cast<float>(static_cast<int32_t
 
 // One pair of dimensions for all samples.
 ORACLE_FOR_WIDE_VECTORS
-void draw_sobol(const uint32_t* reversed_index, const uint32_t* low, const uint32_t* high, uint32_t pair, float* x, float* y) {
-    for (int i = 0; i < batch; ++i) {
+void draw_sobol(const uint32_t* reversed_index, const uint32_t* low, const uint32_t* high, int count, uint32_t pair, float* x,
+                float* y) {
+    ORACLE_INDEPENDENT
+    for (int i = 0; i < count; ++i) {
         const uint32_t order = mix(low[i] ^ (pair * 0x9e3779b9u));
         const uint32_t first = mix(high[i] + order), second = mix(high[i] ^ (order * 0x9e3779b9u));
         const uint32_t index = reverse_bits(scramble_reversed(reversed_index[i], order));
@@ -64,8 +68,8 @@ void draw_sobol(const uint32_t* reversed_index, const uint32_t* low, const uint3
 
 // Philox 4x32-10 (Salmon et al. 2011): a counter, encrypted.
 ORACLE_FOR_WIDE_VECTORS
-void draw_philox(uint64_t seed, uint32_t pixel, uint32_t first_sample, uint32_t block, Block& numbers) {
-    for (int i = 0; i < batch; ++i) {
+void draw_philox(uint64_t seed, uint32_t pixel, uint32_t first_sample, int count, uint32_t block, Block& numbers) {
+    for (int i = 0; i < count; ++i) {
         uint32_t c0 = pixel, c1 = first_sample + static_cast<uint32_t>(i), c2 = block, c3 = 0;
         uint32_t k0 = static_cast<uint32_t>(seed), k1 = static_cast<uint32_t>(seed >> 32);
         for (int round = 0; round < 10; ++round) {
@@ -84,14 +88,20 @@ void draw_philox(uint64_t seed, uint32_t pixel, uint32_t first_sample, uint32_t 
     }
 }
 
+ORACLE_FOR_WIDE_VECTORS
+void draw_hashed(const uint32_t* reversed_index, const uint32_t* low, const uint32_t* high, int count, uint32_t block, float* x) {
+    ORACLE_INDEPENDENT
+    for (int i = 0; i < count; ++i) x[i] = to_unit(mix(mix(low[i] ^ (block * 0x9e3779b9u)) + mix(high[i] ^ reversed_index[i])));
+}
+
 }  // namespace
 
-Sampler::Sampler(SamplerKind kind, uint64_t seed, uint32_t pixel, uint32_t first_sample, uint32_t replicates)
-    : kind_(kind), seed_(seed), pixel_(pixel), first_sample_(first_sample) {
+Sampler::Sampler(SamplerKind kind, uint64_t seed, uint32_t pixel, uint32_t first_sample, int count, uint32_t replicates)
+    : kind_(kind), seed_(seed), pixel_(pixel), first_sample_(first_sample), count_(padded(count)) {
     if (kind == SamplerKind::independent) return;
     // Zero, which hashes leave as it is, would be no scrambling at all: so it is none of the usual seeds.
     const uint64_t start = mix(seed + uint64_t{0x9e3779b97f4a7c15});
-    for (uint32_t i = 0; i < batch; ++i) {
+    for (uint32_t i = 0; i < uint32_t(count_); ++i) {
         const uint32_t sample = first_sample + i;
         reversed_index_[i] = reverse_bits(sample / replicates);
         const uint64_t hash = mix(start + (uint64_t{sample % replicates} << 32 | pixel));
@@ -100,9 +110,16 @@ Sampler::Sampler(SamplerKind kind, uint64_t seed, uint32_t pixel, uint32_t first
 }
 
 void Sampler::draw(uint32_t block, Block& numbers) const {
-    if (kind_ == SamplerKind::independent) return draw_philox(seed_, pixel_, first_sample_, block, numbers);
-    draw_sobol(reversed_index_, low_, high_, 2 * block, numbers.a, numbers.b);
-    draw_sobol(reversed_index_, low_, high_, 2 * block + 1, numbers.c, numbers.d);
+    if (kind_ == SamplerKind::independent) return draw_philox(seed_, pixel_, first_sample_, count_, block, numbers);
+    draw_sobol(reversed_index_, low_, high_, count_, 2 * block, numbers.a, numbers.b);
+    draw_sobol(reversed_index_, low_, high_, count_, 2 * block + 1, numbers.c, numbers.d);
+}
+
+void Sampler::draw_alone(uint32_t block, float* numbers) const {
+    if (kind_ != SamplerKind::independent) return draw_hashed(reversed_index_, low_, high_, count_, block, numbers);
+    Block four;
+    draw_philox(seed_, pixel_, first_sample_, count_, block, four);
+    std::copy(four.a, four.a + count_, numbers);
 }
 
 }  // namespace oracle

@@ -7,7 +7,6 @@
 namespace oracle {
 namespace {
 
-constexpr size_t few_lights = 16;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 // Normals go with the inverse of the map, transposed: but for a positive factor its cofactors, turned over by mirroring,
@@ -232,7 +231,7 @@ void Scene::add_rectangle(int object, const Vec3& corner, const Vec3& u, const V
 // To be called before the geometry is attached.
 void Scene::add_flat(const Vec3& a, const Vec3& b, const Vec3& c, bool parallelogram, uint32_t primitive) {
     few_.add(a, b, c, parallelogram);
-    flat_.push_back({uint32_t(geometries_.size()), primitive, cross(b - a, c - a)});
+    flat_.push_back({uint32_t(geometries_.size()), primitive, normalize(cross(b - a, c - a))});
 }
 
 void Scene::add_disk(int object, const Vec3& center, const Vec3& normal, float radius) {
@@ -356,6 +355,11 @@ void Scene::commit(bool hierarchy) {
     rtcCommitScene(scene_.get());
     check("build the scene");
 
+    for (size_t i = 0; is_small_ && i < flat_.size(); ++i) {
+        const Object& owner = objects[geometries_[flat_[i].geometry].object];
+        if (owner.emits) lights[size_t(owner.first_light) + flat_[i].primitive].few = few_.screen_of(int(i));
+    }
+
     needs_choices = has_medium || std::any_of(materials.begin(), materials.end(), [](const Material& m) {
                         using Kind = Material::Kind;
                         return m.kind == Kind::dielectric || m.kind == Kind::rough_dielectric || m.kind == Kind::plastic ||
@@ -372,25 +376,26 @@ void Scene::commit(bool hierarchy) {
     if (!light_cdf_.empty()) light_cdf_.back() = 1;
 }
 
-bool Scene::closest_of_few(const Ray& ray, Hit& hit) const {
-    const Few::Hit found = few_.closest(ray.origin, ray.direction, infinity);
+// What a search among the few flat surfaces has found, unless a round one is nearer.
+bool Scene::complete(const Ray& ray, const Few::Hit& found, Hit& hit) const {
     hit.distance = float(found.distance), hit.u = found.u, hit.v = found.v;
-    if (found.index >= 0) {
+    hit.few = Few::none;
+    if (found.index != Few::none) {
         const Flat& flat = flat_[size_t(found.index)];
         hit.normal = flat.normal, hit.geometry = flat.geometry, hit.primitive = flat.primitive;
+        hit.few = few_.screen_of(found.index);
     }
-    bool any = found.index >= 0;
+    bool any = found.index != Few::none;
     for (const uint32_t i : round_) {
         const float t = UserGeometry::distance(geometries_[i], make_ray(ray.origin, ray.direction, hit.distance));
         if (!(t < hit.distance)) continue;
-        hit.distance = t, hit.geometry = i, hit.primitive = 0;
+        hit.distance = t, hit.geometry = i, hit.primitive = 0, hit.few = Few::none;
         any = true;
     }
     return any;
 }
 
-bool Scene::is_blocked_by_few(const Connection& c) const {
-    if (few_.closest(c.from, c.direction, c.distance).index >= 0) return true;
+bool Scene::is_blocked_by_round(const Connection& c) const {
     return std::any_of(round_.begin(), round_.end(), [&](uint32_t i) {
         return UserGeometry::distance(geometries_[i], make_ray(c.from, c.direction, c.distance)) < c.distance;
     });
@@ -399,7 +404,7 @@ bool Scene::is_blocked_by_few(const Connection& c) const {
 bool Scene::intersect(const Ray& ray, Surface& s) const {
     Hit hit;
     if (is_small_) {
-        if (!closest_of_few(ray, hit)) return false;
+        if (!complete(ray, few_.closest(ray.origin, ray.direction, infinity), hit)) return false;
         describe(ray, hit, s);
         return true;
     }
@@ -411,17 +416,28 @@ bool Scene::intersect(const Ray& ray, Surface& s) const {
     const RTCHit& h = query.hit;
     if (h.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     const uint32_t geometry = h.instID[0] == RTC_INVALID_GEOMETRY_ID ? h.geomID : h.instID[0];
-    describe(ray, {query.ray.tfar, h.u, h.v, {h.Ng_x, h.Ng_y, h.Ng_z}, geometry, h.primID}, s);
+    describe(ray, {query.ray.tfar, h.u, h.v, {h.Ng_x, h.Ng_y, h.Ng_z}, geometry, h.primID, Few::none}, s);
     return true;
 }
 
 void Scene::intersect(const Ray* rays, int count, bool together, Surface* surfaces, bool* hits) const {
-    if (!together || is_small_) {
-        for (int i = 0; i < count; ++i)
-            hits[i] = intersect(rays[i], surfaces[i]);
-        return;
+    for (int first = 0; is_small_ && first < count; first += Few::side_by_side) {
+        Few::Rays eight;
+        Few::Hit found[Few::side_by_side];
+        for (int k = 0; k < Few::side_by_side; ++k) {
+            const Ray& ray = rays[std::min(first + k, count - 1)];
+            eight.set(k, ray.origin, ray.direction, infinity, ray.begin, Few::none);
+        }
+        few_.closest(eight, found);
+        for (int k = 0; k < Few::side_by_side && first + k < count; ++k) {
+            const int i = first + k;
+            Hit hit;
+            hits[i] = complete(rays[i], found[k], hit);
+            if (hits[i]) describe(rays[i], hit, surfaces[i]);
+        }
     }
-    for (int first = 0; first < count; first += 8) {
+    for (int i = 0; !is_small_ && !together && i < count; ++i) hits[i] = intersect(rays[i], surfaces[i]);
+    for (int first = 0; !is_small_ && together && first < count; first += 8) {
         alignas(32) int valid[8];
         RTCRayHit8 query;
         for (int k = 0; k < 8; ++k) {
@@ -440,7 +456,7 @@ void Scene::intersect(const Ray* rays, int count, bool together, Surface* surfac
             const auto& h = query.hit;
             const uint32_t instance = h.instID[0][k], geometry = instance == RTC_INVALID_GEOMETRY_ID ? h.geomID[k] : instance;
             const Vec3 normal{h.Ng_x[k], h.Ng_y[k], h.Ng_z[k]};
-            describe(rays[i], {query.ray.tfar[k], h.u[k], h.v[k], normal, geometry, h.primID[k]}, surfaces[i]);
+            describe(rays[i], {query.ray.tfar[k], h.u[k], h.v[k], normal, geometry, h.primID[k], Few::none}, surfaces[i]);
         }
     }
 }
@@ -453,6 +469,7 @@ void Scene::describe(const Ray& ray, const Hit& hit, Surface& s) const {
     s.extent = g.extent;
     s.primitive = hit.primitive;
     s.material = objects[g.object].material;
+    s.few = hit.few;
     switch (g.kind) {
         case Kind::disk:
             s.normal = s.shading = g.normal;
@@ -471,7 +488,7 @@ void Scene::describe(const Ray& ray, const Hit& hit, Surface& s) const {
     }
     const bool is_instance = g.kind == Kind::instance;
     const Vec3 normal = is_instance ? transformed_normal(g.transform, hit.normal) : hit.normal;
-    s.normal = s.shading = normalize(normal);
+    s.normal = s.shading = hit.few == Few::none ? normalize(normal) : normal;
     if (g.mesh < 0) return;
     const Mesh& mesh = *meshes_[size_t(g.mesh)];
     const Triangle& t = mesh.triangles[s.primitive];
@@ -490,18 +507,33 @@ void Scene::describe(const Ray& ray, const Hit& hit, Surface& s) const {
 
 
 void Scene::blocked(const Connection* connections, int count, bool together, bool* result) const {
-    if (!together || is_small_) {
+    if (is_small_) {
+        int chosen[Few::side_by_side], waiting = 0;
         for (int i = 0; i < count; ++i) {
-            const Connection& c = connections[i];
-            result[i] = is_black(c.light) || (is_small_ && is_blocked_by_few(c));
-            if (result[i] || is_small_) continue;
-            RTCRay ray = make_ray(c.from, c.direction, c.distance);
-            any_hit(scene_.get(), ray);
-            result[i] = ray.tfar < 0;
+            result[i] = is_black(connections[i].light) || is_blocked_by_round(connections[i]);
+            if (!result[i]) chosen[waiting++] = i;
+            if (waiting == 0 || (waiting < Few::side_by_side && i + 1 < count)) continue;
+            Few::Rays eight;
+            bool found[Few::side_by_side];
+            for (int k = 0; k < Few::side_by_side; ++k) {
+                const Connection& c = connections[chosen[std::min(k, waiting - 1)]];
+                eight.set(k, c.from, c.direction, c.distance, c.begin, c.end);
+            }
+            few_.blocked(eight, found);
+            for (int k = 0; k < waiting; ++k) result[chosen[k]] = found[k];
+            waiting = 0;
         }
         return;
     }
-    for (int first = 0; first < count; first += 8) {
+    for (int i = 0; !together && i < count; ++i) {
+        const Connection& c = connections[i];
+        result[i] = is_black(c.light);
+        if (result[i]) continue;
+        RTCRay ray = make_ray(c.from, c.direction, c.distance);
+        any_hit(scene_.get(), ray);
+        result[i] = ray.tfar < 0;
+    }
+    for (int first = 0; together && first < count; first += 8) {
         alignas(32) int valid[8];
         RTCRay8 query;
         bool any = false;
@@ -563,6 +595,11 @@ float Scene::light_probability(const Vec3& from, int light) const {
 
 bool Scene::leave_to_sampling(const Light& light, const Vec3& from) const {
     return light_cdf_.size() <= few_lights && is_sampled_evenly(light, from);
+}
+
+bool Scene::has_few_patches() const {
+    return !lights.empty() && lights.size() <= few_lights && !samples_environment &&
+           std::all_of(lights.begin(), lights.end(), [](const Light& l) { return l.is_patch() && l.radiance.texture < 0; });
 }
 
 bool Scene::leaves_all_to_sampling(const Vec3& from) const {

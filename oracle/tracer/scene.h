@@ -37,6 +37,7 @@ struct Object {
 
 struct Ray {
     Vec3 origin, direction;  // a unit vector
+    int begin = Few::none;   // the surface on which it begins, as `Surface::few` names it
 };
 
 // Where a ray met a surface.
@@ -49,6 +50,7 @@ struct Surface {
     float extent;  // of the shape, as for a light
     uint32_t object, primitive;
     int material;  // -1 is black
+    int few;       // its name among few surfaces, `Few::none` if it is not one of them
 };
 
 // Light that comes from somewhere if nothing is in between. Its ends are off their surfaces.
@@ -56,6 +58,7 @@ struct Connection {
     Vec3 from, direction;  // a unit vector
     float distance;
     Color light;
+    int begin = Few::none, end = Few::none;  // the surfaces at its ends, as `Surface::few` names them
 };
 
 class Scene {
@@ -95,6 +98,8 @@ public:
     // Whether a diffuse surface at `from` had better leave the light to being sampled: it would only gain noise.
     bool leave_to_sampling(const Light& light, const Vec3& from) const;
     bool leaves_all_to_sampling(const Vec3& from) const;
+    // Whether all that is selected are a few flat emitters of constant radiance.
+    bool has_few_patches() const;
     bool has_smooth_environment() const { return environment.kind != Environment::Kind::none && !samples_environment; }
 
     std::vector<Texture> textures;
@@ -129,9 +134,10 @@ private:
         float distance, u, v;
         Vec3 normal;  // of any length; untransformed, if on an instance
         uint32_t geometry, primitive;
+        int few;
     };
-    bool closest_of_few(const Ray& ray, Hit& hit) const;
-    bool is_blocked_by_few(const Connection& connection) const;
+    bool complete(const Ray& ray, const Few::Hit& found, Hit& hit) const;
+    bool is_blocked_by_round(const Connection& connection) const;
     void describe(const Ray& ray, const Hit& hit, Surface& surface) const;
     void add_flat(const Vec3& a, const Vec3& b, const Vec3& c, bool parallelogram, uint32_t primitive);
     void attach(RTCGeometry geometry, const Geometry& description);
@@ -159,7 +165,7 @@ private:
 };
 
 // More than rounding can have moved a point that was computed from numbers as large as `reach`.
-inline float rounding(const Vec3& p, float reach) { return 5e-7f * std::max(largest(p), std::min(reach, 1e18f)); }
+inline float rounding(const Vec3& p, float reach) { return 5e-7f * larger(largest(p), smaller(reach, 1e18f)); }
 
 // Off a surface, to the side where `direction` points, by more than rounding can have moved the point.
 inline Vec3 off_surface(const Vec3& p, const Vec3& normal, const Vec3& direction, float reach) {

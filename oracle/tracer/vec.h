@@ -3,11 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace oracle {
 
 constexpr float pi = 3.14159265358979f;
 constexpr float inv_pi = 1 / pi;
+
+// As std::min and std::max, which pass references and so keep compilers from making vectors.
+inline float smaller(float a, float b) { return b < a ? b : a; }
+inline float larger(float a, float b) { return a < b ? b : a; }
 
 struct Vec2 {
     float x, y;
@@ -37,13 +42,13 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 inline float length_squared(const Vec3& a) { return dot(a, a); }
 inline float length(const Vec3& a) { return std::sqrt(dot(a, a)); }
 inline Vec3 normalize(const Vec3& a) { return a / length(a); }
-inline float max_component(const Vec3& a) { return std::max({a.x, a.y, a.z}); }
-inline float largest(const Vec3& a) { return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
+inline float max_component(const Vec3& a) { return larger(a.x, larger(a.y, a.z)); }
+inline float largest(const Vec3& a) { return max_component({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
 inline bool is_black(const Color& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
 inline float mean(const Color& c) { return (c.x + c.y + c.z) / 3; }
 inline Color white() { return {1, 1, 1}; }
 inline float squared(float x) { return x * x; }
-inline float safe_sqrt(float x) { return std::sqrt(std::max(x, 0.0f)); }
+inline float safe_sqrt(float x) { return std::sqrt(larger(x, 0.0f)); }
 
 // An orthonormal basis around a normal, which becomes the z axis.
 struct Frame {
@@ -68,17 +73,41 @@ inline void sine_cosine_of_octant(float a, float& sine, float& cosine) {
     cosine = 1 + q * (-0.5f + q * (1.0f / 24 + q * (-1.0f / 720 + q * (1.0f / 40320))));
 }
 
+// The same of any angle up to some hundred. Unlike the C library's these functions are the same everywhere, and compilers
+// make vectors of them.
+inline void sine_cosine(float a, float& sine, float& cosine) {
+    const auto quarter = static_cast<int32_t>(a * (2 / pi) + std::copysign(0.5f, a));
+    const auto k = static_cast<float>(quarter);
+    float s, c;
+    // pi/2 in three parts (Cody and Waite 1980).
+    sine_cosine_of_octant(a - k * 1.5703125f - k * 4.83751297e-4f - k * 7.5497899549e-8f, s, c);
+    const bool odd = quarter & 1;
+    const float first = odd ? c : s, second = odd ? s : c;
+    sine = quarter & 2 ? -first : first;
+    cosine = (quarter + 1) & 2 ? -second : second;
+}
+
+// Angle of (x, y) in [-pi, pi], to some 1e-7 of itself; a Chebyshev fit of atan(q)/q in powers of q^2.
+inline float arc_tangent(float y, float x) {
+    const float u = std::fabs(x), v = std::fabs(y);
+    const float large = larger(u, v), small = smaller(u, v);
+    const float q = small / (large > 0 ? large : 1), q2 = q * q;
+    const float high = (((0.0027662836f * q2 - 0.015731249f) * q2 + 0.042137624f) * q2 - 0.074568548f) * q2 + 0.10618371f;
+    const float sum = (((high * q2 - 0.14197798f) * q2 + 0.19991872f) * q2 - 0.33333037f) * q2 + 1;
+    float angle = q * sum;
+    angle = v > u ? pi / 2 - angle : angle;
+    angle = x < 0 ? pi - angle : angle;
+    return std::copysign(angle, y);
+}
+
 // Uniform point of the unit disk; neighbours stay neighbours (Shirley and Chiu 1997).
 inline Vec2 square_to_disk(const Vec2& u) {
     const float a = 2 * u.x - 1, b = 2 * u.y - 1;
-    if (a == 0 && b == 0) return {0, 0};
+    const bool wide = std::fabs(a) > std::fabs(b);
+    const float radius = wide ? a : b, other = wide ? b : a;
     float s, c;
-    if (std::fabs(a) > std::fabs(b)) {
-        sine_cosine_of_octant(pi / 4 * (b / a), s, c);
-        return {a * c, a * s};
-    }
-    sine_cosine_of_octant(pi / 4 * (a / b), s, c);
-    return {b * s, b * c};
+    sine_cosine_of_octant(pi / 4 * (other / (radius == 0 ? 1 : radius)), s, c);
+    return {radius * (wide ? c : s), radius * (wide ? s : c)};
 }
 
 // Density cos(theta) / pi.
