@@ -20,9 +20,9 @@ from reference_scenes.without_closed_form import SCENES
 
 FOLDER = Path(__file__).parent / "mitsuba"
 # Independent renderings, from whose spread the standard error is known.
-RENDERINGS = 32
+RENDERINGS = 64
 # What the mean of each channel over the image is to be known to, so that half a percent is seen beyond doubt.
-WANTED = 7e-4
+WANTED = 4e-4
 BLOCK = 8
 
 
@@ -76,7 +76,7 @@ def opinion(name: str) -> Opinion:
     # A first look tells how many samples that takes; it is not used otherwise.
     first = 8 if SCENES[name]().film.width > 1 else 4096
     mean, error = summary(renderings(name, first, range(RENDERINGS)).mean(axis=(1, 2)))
-    spp = max(32, int(np.ceil(first * (error / mean / WANTED).max() ** 2)))
+    spp = max(16, int(np.ceil(first * (error / mean / WANTED).max() ** 2)))
     images = renderings(name, spp, range(1000, 1000 + RENDERINGS))
     mean, error = summary(images.mean(axis=(1, 2)))
     by_block, block_errors = summary(blocks(images))

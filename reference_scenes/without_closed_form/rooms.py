@@ -64,10 +64,10 @@ def colour_bleeding() -> model.Scene:
 
 def through_a_gap() -> model.Scene:
     """A room whose only light comes through the gap above a partition, from a lamp that is not seen."""
-    partition = model.Object(shape=block((0.3, 0.0, 0.65), (0.02, 1.0, 0.65)), material=WHITE)
+    partition = model.Object(shape=block((0.3, 0.0, 0.65), (0.02, 1.0, 0.65)), material=GREY)
     return model.Scene(
         objects=(
-            model.Object(shape=walls(1.0, 2.0, "floor", "ceiling", "back", "front", "left", "right"), material=WHITE),
+            model.Object(shape=walls(1.0, 2.0, "floor", "ceiling", "back", "front", "left", "right"), material=GREY),
             partition,
             ball((-0.4, 0.2, 0.3), 0.3, GREEN),
         ),
@@ -115,7 +115,7 @@ def mirror_maze() -> model.Scene:
             model.Object(shape=rectangle((0.0, 1.0, 0.75), (1.0, 0.1, 0.0), (0.0, 0.0, 0.75)), material=silver),
             ball((0.2, 0.1, 0.3), 0.3, RED),
         ),
-        emitters=(ceiling_lamp((0.0, 0.0, 1.6), 0.7, 0.7, (4.0, 4.0, 4.0)),),
+        emitters=(ceiling_lamp((0.0, 0.0, 1.6), 1.0, 1.0, (3.0, 3.0, 3.0)),),
         camera=camera((0.5, -2.6, 1.4), (0.0, 0.2, 0.5), 42.0),
         film=FILM,
     )
@@ -123,12 +123,12 @@ def mirror_maze() -> model.Scene:
 
 def fog() -> model.Scene:
     """A lamp, a shining ball and a white one in grey fog that scatters forwards."""
-    return _in_fog(model.Medium(absorption=(0.05, 0.05, 0.05), scattering=(0.1, 0.1, 0.1), asymmetry=0.4))
+    return _in_fog(model.Medium(absorption=(0.02, 0.02, 0.02), scattering=(0.06, 0.06, 0.06), asymmetry=0.4))
 
 
 def coloured_fog() -> model.Scene:
     """The same in smoke that dims blue light more than red, and scatters it backwards."""
-    return _in_fog(model.Medium(absorption=(0.0, 0.1, 0.2), scattering=(0.05, 0.08, 0.15), asymmetry=-0.3))
+    return _in_fog(model.Medium(absorption=(0.01, 0.03, 0.06), scattering=(0.06, 0.05, 0.04), asymmetry=-0.3))
 
 
 def _in_fog(medium: model.Medium) -> model.Scene:
