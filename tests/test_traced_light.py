@@ -98,6 +98,30 @@ def test_all_strategies_find_the_light_of_every_emitter_with_extent(name, strate
     assert_right(shown, np.array([0.8, 0.5, 0.2]) / np.pi * irradiances(lit, FLOOR, FILM), known_to=0.1)
 
 
+@pytest.mark.parametrize("name", LAMPS)
+@SURFACES
+def test_a_diffuse_surface_reflects_the_light_of_every_emitter(name, crowd):
+    lit = scene_of(LAMPS[name], Object(FLOOR, Diffuse([0.8, 0.5, 0.2])), *crowd)
+    shown = render(lit, looking_down(FLOOR), FILM, spp=1 << 13, bounces=1)
+    assert_right(shown, np.array([0.8, 0.5, 0.2]) / np.pi * irradiances(LAMPS[name], FLOOR, FILM), known_to=4e-3)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Rectangle([0.3, 0.2, 0.4], [1, 0, 0], [0, 0.5, 0]),
+        Mesh(TRIANGLE, [[0, 1, 2]]),
+        Disk([0.3, 0.2, 0.4], [0, 0, 1], 0.5),
+    ],
+    ids=lambda shape: type(shape).__name__,
+)
+@pytest.mark.parametrize("strategy", ["light", "mis"])
+def test_behind_a_lamp_that_shines_on_one_side_it_is_dark(shape, strategy):
+    scene = scene_of([Area(shape, LIGHT)], Object(FLOOR, Diffuse([0.8] * 3)))
+    assert (render(scene, looking_down(FLOOR), FILM, spp=256, strategy=strategy, bounces=1).mean == 0).all()
+    assert (render(scene, IrradianceMeter(FLOOR), FILM, spp=256, strategy=strategy, bounces=0).mean == 0).all()
+
+
 def test_a_lamp_hides_the_environment_behind_it():
     around, lamps = 0.1 * LIGHT, LAMPS["a disk"]
     more = Area(lamps[0].shape, LIGHT - around)
@@ -138,8 +162,9 @@ def random_case(kind, rng):
 
 
 @pytest.mark.parametrize("kind", ["rectangle", "triangle", "disk", "sphere"])
+@pytest.mark.parametrize("receiver", ["meter", "surface"])
 @SURFACES
-def test_emitters_of_any_size_distance_and_orientation_are_right(kind, crowd):
+def test_emitters_of_any_size_distance_and_orientation_are_right(kind, receiver, crowd):
     rng = np.random.default_rng(2)
     counted = 0
     for seed in range(150):
@@ -148,8 +173,18 @@ def test_emitters_of_any_size_distance_and_orientation_are_right(kind, crowd):
         # Light that comes along the surface, or from a plane seen edge-on, single precision does not know to 0.05 %.
         if expected[0, 0, 0] < 3e-3 * np.pi:
             continue
-        scene = scene_of([emitter], *crowd)
-        measured = render(scene, IrradianceMeter(surface), Film(1, 1), spp=1 << 11, seed=seed, bounces=0)
+        # Points on surfaces are rounded to 5e-7 of their coordinates, which must be little against what is shown.
+        if receiver == "surface" and np.linalg.norm(surface.half_u) < 1e-4 * np.abs(surface.center).max():
+            continue
+        if receiver == "meter":
+            scene, sensor, bounces = scene_of([emitter], *crowd), IrradianceMeter(surface), 0
+        else:
+            # Larger than what is seen of it, as its outline is rounded.
+            ground = Rectangle(surface.center, 2 * surface.half_u, 2 * surface.half_v)
+            scene = scene_of([emitter], Object(ground, Diffuse([1.0] * 3)), *crowd)
+            sensor, bounces = looking_down(surface, 0.1 * np.linalg.norm(surface.half_u)), 1
+            expected = expected / np.pi
+        measured = render(scene, sensor, Film(1, 1), spp=1 << 11, seed=seed, bounces=bounces)
         off, error = (
             measured.mean[0, 0, 0] / expected[0, 0, 0] - 1,
             measured.standard_error[0, 0, 0] / expected[0, 0, 0],

@@ -198,16 +198,10 @@ struct Draws {
     Block first, second;
     float roulette[batch];
 
-    Draws(const Scene& scene, const Sampler& sampler, uint32_t step) {
+    void draw(const Scene& scene, const Sampler& sampler, uint32_t step) {
         sampler.draw(3 * step + 1, first);
-        if (scene.needs_choices)
-            sampler.draw(3 * step + 2, second);
-        else
-            second = {};
-        if (int(step) + 1 >= roulette_from)
-            sampler.draw_alone(3 * step + 3, roulette);
-        else
-            std::fill_n(roulette, batch, 0.0f);
+        if (scene.needs_choices) sampler.draw(3 * step + 2, second);
+        if (int(step) + 1 >= roulette_from) sampler.draw_alone(3 * step + 3, roulette);
     }
 
     Draw of(int i) const {
@@ -317,7 +311,9 @@ void scatter(const Scene& scene, const Method& method, DiffuseVertices& vertices
         }
     }
     // The last ray would find nothing that was not sampled.
-    if (bounce == method.bounces && scene.environment.kind == Environment::Kind::none) return;
+    const bool is_last = bounce == method.bounces;
+    if (is_last && std::all_of(slots, slots + vertices.size(), [&](int k) { return scene.leaves_all_to_sampling(surfaces[k].p); }))
+        return;
     vertices.reflect(bounce >= roulette_from, bounce >= roulette_for_all_from ? longest_survival : 1);
     for (int k = 0; k < vertices.size(); ++k) {
         Path& path = paths[owners[slots[k]]];
@@ -363,15 +359,16 @@ void measure(const Scene& scene, const Sensor& sensor, const Film& film, const M
     bool blocked[batch];
 
     // Diffuse surfaces are left for the end of each step, if that serves them.
-    const bool is_plain = method.strategy == Strategy::mis && !scene.has_medium && scene.has_few_patches();
+    const bool is_plain = method.strategy == Strategy::mis && !scene.has_medium && scene.has_few_lights();
     DiffuseVertices diffuse;
     int diffuse_slots[batch];
 
     Block film_block;
     sampler.draw(0, film_block);
     uint32_t step = 0;
+    Draws draws{};
     if (at_meter) {
-        const Draws draws(scene, sampler, step++);
+        draws.draw(scene, sampler, step++);
         for (int i = 0; i < count; ++i) {
             const Vec2 position = film_position(film, x, y, {film_block.a[i], film_block.b[i]});
             if (begin_at_meter(scene, method, sensor, position, paths[i], draws.of(i), connections[i])) alive[living++] = i;
@@ -391,7 +388,9 @@ void measure(const Scene& scene, const Sensor& sensor, const Film& film, const M
         bool hits[batch];
         for (int k = 0; k < living; ++k) rays[k] = paths[alive[k]].ray;
         scene.intersect(rays, living, together, surfaces, hits);
-        const Draws draws(scene, sampler, step++);
+        // Paths that leave the scene need no numbers.
+        if (scene.has_medium || std::any_of(hits, hits + living, [](bool hit) { return hit; })) draws.draw(scene, sampler, step);
+        ++step;
         const int arrived = living;
         int owners[batch];
         living = 0;

@@ -9,12 +9,6 @@ using Kind = Light::Kind;
 
 bool is_near(const Light& l, const Vec3& from) { return is_near(l.area, l.center, from); }
 
-// 1 - cos of the half angle of the cone that a sphere fills, without cancellation.
-float one_minus_cosine(const Light& l, float distance_squared) {
-    const float sine2 = l.radius * l.radius / distance_squared;
-    return sine2 / (1 + safe_sqrt(1 - sine2));
-}
-
 Color emitted(const Light& l, const std::vector<Texture>& textures, float s, float t) {
     if (l.radiance.texture < 0) return l.radiance.constant;
     const float r = 1 - s - t;
@@ -34,34 +28,6 @@ LightSample towards(const Light& l, const Vec3& from, const Vec3& point, const V
     return {d / distance, distance, point, behind ? -normal : normal, radiance, pdf};
 }
 
-LightSample sample_sphere(const Light& l, const Vec3& from, const Vec2& u) {
-    const Vec3 to_center = l.p - from;
-    const float d2 = length_squared(to_center), r2 = l.radius * l.radius;
-    if (d2 <= r2 * 1.000001f) {
-        // From within, or all but touching.
-        const Vec3 n = square_to_sphere(u);
-        return towards(l, from, l.p + l.radius * n, n, l.radiance.constant);
-    }
-    const float part = one_minus_cosine(l, d2);
-    const float gap = u.x * part;  // 1 - cosine of the sample's angle
-    const float sine2 = gap * (2 - gap), cosine = 1 - gap;
-    const float distance = std::sqrt(d2);
-    // Where the ray meets the sphere first, as its angle at the center (pbrt, 4th edition, section 6.2.4).
-    const float along = distance * cosine - safe_sqrt(r2 - d2 * sine2);
-    const float sine = safe_sqrt(sine2), phi = 2 * pi * u.y;
-    const Frame frame(to_center / distance);
-    const Vec3 w = frame.to_world({sine * std::cos(phi), sine * std::sin(phi), cosine});
-    const Vec3 n = normalize(along * w - to_center);
-    // At the rim the ray grazes: the side is not decided by rounding.
-    const Vec3 point = l.p + l.radius * n;
-    return {w, along, point, n, l.radiance.constant, 1 / (2 * pi * part)};
-}
-
-float spot_falloff(const Light& l, float cosine) {
-    const float angle = std::acos(std::clamp(cosine, -1.0f, 1.0f));
-    return std::clamp((l.cutoff - angle) / (l.cutoff - l.full), 0.0f, 1.0f);
-}
-
 }  // namespace
 
 LightSample sample_light(const Light& l, const std::vector<Texture>& textures, const Vec3& from, const Vec2& u) {
@@ -78,7 +44,14 @@ LightSample sample_light(const Light& l, const std::vector<Texture>& textures, c
             const Vec2 d = square_to_disk(u);
             return towards(l, from, l.p + d.x * l.u + d.y * l.v, l.n, l.radiance.constant);
         }
-        case Kind::sphere: return sample_sphere(l, from, u);
+        case Kind::sphere: {
+            const EmitterSample at = sample_sphere(l.p, l.radius, from, u.x, u.y);
+            if (!(at.pdf > 0)) return towards(l, from, at.point, at.normal, l.radiance.constant);
+            // At the rim the ray grazes: the side is not decided by rounding.
+            const Vec3 d = at.point - from;
+            const float distance = length(d);
+            return {d / distance, distance, at.point, at.normal, l.radiance.constant, at.pdf};
+        }
         case Kind::point:
         case Kind::spot: {
             const Vec3 d = l.p - from;
@@ -86,7 +59,7 @@ LightSample sample_light(const Light& l, const std::vector<Texture>& textures, c
             if (!(d2 > 0)) return {};
             const float distance = std::sqrt(d2);
             const Vec3 w = d / distance;
-            const float part = l.kind == Kind::spot ? spot_falloff(l, -dot(w, l.n)) : 1;
+            const float part = l.kind == Kind::spot ? spot_falloff(l.full, l.cutoff, length(cross(w, l.n)), -dot(w, l.n)) : 1;
             if (part == 0) return {};
             return {w, distance, l.p, {}, part / d2 * l.light, 1};
         }
@@ -100,7 +73,7 @@ float light_pdf(const Light& l, const Vec3& from, const Vec3& direction, float d
     if (l.kind == Kind::triangle && is_near(l, from)) return 1 / SphericalTriangle(l, from).solid_angle;
     if (l.kind == Kind::sphere) {
         const float d2 = length_squared(l.p - from);
-        if (d2 > squared(l.radius) * 1.000001f) return 1 / (2 * pi * one_minus_cosine(l, d2));
+        if (is_outside(d2, l.radius)) return 1 / (2 * pi * one_minus_cosine(d2, l.radius));
     }
     return distance * distance / (std::fabs(dot(direction, normal)) * l.area);
 }
@@ -109,19 +82,10 @@ bool is_sampled_evenly(const Light& l, const Vec3& from) {
     switch (l.kind) {
         case Kind::rectangle:
         case Kind::triangle: return true;
-        case Kind::sphere: return length_squared(l.p - from) > squared(l.radius) * 1.000001f;
+        case Kind::sphere: return is_outside(length_squared(l.p - from), l.radius);
         // Sampled by area, whose density per solid angle rises slowly as long as the disk is no nearer than wide.
         default: return l.area < length_squared(l.p - from);
     }
-}
-
-float importance(const Light& l, const Vec3& from) {
-    constexpr float least = 1e-30f;
-    if (l.kind == Kind::directional) return l.brightness + least;
-    const float d2 = length_squared(l.center - from) + least;
-    if (l.is_delta()) return l.brightness / d2 + least;
-    if (l.kind == Kind::sphere) return l.brightness * pi * squared(l.radius) / std::max(d2, squared(l.radius)) + least;
-    return importance_of_patch(l, from);
 }
 
 }  // namespace oracle

@@ -1,7 +1,7 @@
 // Emitters of finite extent or power: how much light they send to a point, and how to choose a point on them.
 #pragma once
 
-#include "patch.h"
+#include "light_sampling.h"
 #include "texture.h"
 #include "vec.h"
 
@@ -16,6 +16,8 @@ struct Light : Patch {
     float extent = 0;  // longest edge or radius, by whose rounding points on it are off
     Vec3 center{};     // of whatever has a surface
     float brightness = 0;  // mean of `light` over the channels
+    // At a distance d it illuminates as much as `shown` / d^2, at most `most`, of its brightness; from behind `behind` of that.
+    float shown = 1, most = 1, behind = 1;
     float full = 0, cutoff = 0;  // half angles of a spot
     Color light{};     // radiance, intensity or irradiance; the mean of a textured radiance
     ColorMap radiance; // of an area light
@@ -24,7 +26,6 @@ struct Light : Patch {
     int few = -1;  // its surface among few, as `Surface::few` names it
 
     bool is_delta() const { return kind >= Kind::point; }
-    bool is_patch() const { return kind <= Kind::rectangle; }
 };
 
 struct LightSample {
@@ -51,16 +52,11 @@ bool is_sampled_evenly(const Light& light, const Vec3& from);
 // Where there are no more lights than this, each of them is looked at to choose one.
 constexpr size_t few_lights = 16;
 
-// `importance` of a rectangle or triangle.
-inline float importance_of_patch(const Light& light, const Vec3& from) {
-    const float d2 = length_squared(light.center - from) + 1e-30f;
-    const float shown = light.brightness * smaller(light.area / d2, pi);
-    // Behind a one-sided light there is none, and never more than from the whole hemisphere.
-    const bool seen = light.two_sided | (dot(from - light.p, light.n) > 0);
-    return (seen ? shown : 0) + 1e-30f;
-}
-
 // About the irradiance that the light gives to a surface at `from` that faces it, with nothing in between; positive.
-float importance(const Light& light, const Vec3& from);
+inline float importance(const Light& light, const Vec3& from) {
+    const float d2 = length_squared(light.center - from) + 1e-30f;
+    const float side = dot(from - light.p, light.n) > 0 ? 1 : light.behind;
+    return light.brightness * smaller(light.shown / d2, light.most) * side + 1e-30f;
+}
 
 }  // namespace oracle

@@ -323,7 +323,13 @@ void Scene::add_area_lights(int object, const Geometry& g, const Mesh* mesh) {
 
 void Scene::add_light(const Light& light) {
     lights.push_back(light);
-    lights.back().brightness = mean(light.light);
+    Light& added = lights.back();
+    added.brightness = mean(light.light);
+    // Surfaces give no more than the hemisphere would. Parallel light is the same everywhere.
+    const bool is_sphere = light.kind == Light::Kind::sphere;
+    added.shown = light.kind == Light::Kind::directional ? infinity : light.is_delta() ? 1 : is_sphere ? light.area / 4 : light.area;
+    added.most = light.kind == Light::Kind::directional ? 1 : light.is_delta() ? infinity : pi;
+    added.behind = light.is_delta() || is_sphere || light.two_sided ? 1 : 0;
 }
 
 void Scene::set_environment(Environment e) {
@@ -597,9 +603,9 @@ bool Scene::leave_to_sampling(const Light& light, const Vec3& from) const {
     return light_cdf_.size() <= few_lights && is_sampled_evenly(light, from);
 }
 
-bool Scene::has_few_patches() const {
+bool Scene::has_few_lights() const {
     return !lights.empty() && lights.size() <= few_lights && !samples_environment &&
-           std::all_of(lights.begin(), lights.end(), [](const Light& l) { return l.is_patch() && l.radiance.texture < 0; });
+           std::all_of(lights.begin(), lights.end(), [](const Light& l) { return l.radiance.texture < 0; });
 }
 
 bool Scene::leaves_all_to_sampling(const Vec3& from) const {

@@ -98,8 +98,8 @@ public:
     // Whether a diffuse surface at `from` had better leave the light to being sampled: it would only gain noise.
     bool leave_to_sampling(const Light& light, const Vec3& from) const;
     bool leaves_all_to_sampling(const Vec3& from) const;
-    // Whether all that is selected are a few flat emitters of constant radiance.
-    bool has_few_patches() const;
+    // Whether all that is selected are a few emitters of constant radiance.
+    bool has_few_lights() const;
     bool has_smooth_environment() const { return environment.kind != Environment::Kind::none && !samples_environment; }
 
     std::vector<Texture> textures;

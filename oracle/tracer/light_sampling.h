@@ -1,4 +1,4 @@
-// Sampling of flat emitters as they are seen from a point. Nothing here branches, so that compilers make vectors of it.
+// Sampling of emitters as they are seen from a point. Nothing here branches, so that compilers make vectors of it.
 #pragma once
 
 #include "vec.h"
@@ -127,6 +127,50 @@ struct SphericalTriangle {
     const float least = smaller(u, v) / 2;
     const float x = v > u ? least : u - least, y = v > u ? v - least : least;
     return {by_angle ? s : x, by_angle ? t : y, by_angle ? 1 / seen.solid_angle : 0};
+}
+
+// A point on an emitter, its normal (zero if there is none), and its density per solid angle, or 0 if it was chosen by area
+// and tells by its side whether it shines.
+struct EmitterSample {
+    Vec3 point, normal;
+    float pdf;
+};
+
+// Whether a sphere is seen from outside, and not all but touching.
+inline bool is_outside(float distance_squared, float radius) { return distance_squared > radius * radius * 1.000001f; }
+
+// 1 - cos of the half angle of the cone that a sphere fills, without cancellation.
+inline float one_minus_cosine(float distance_squared, float radius) {
+    const float sine2 = radius * radius / distance_squared;
+    return sine2 / (1 + safe_sqrt(1 - sine2));
+}
+
+inline EmitterSample sample_sphere(const Vec3& center, float radius, const Vec3& from, float u, float v) {
+    const Vec3 to_center = center - from;
+    const float d2 = length_squared(to_center), distance = std::sqrt(d2), r2 = radius * radius;
+    const bool outside = is_outside(d2, radius);
+    const float part = outside ? one_minus_cosine(d2, radius) : 2;
+    const float gap = u * part;  // 1 - cosine of the sample's angle
+    const float sine2 = gap * (2 - gap), cosine = 1 - gap, sine = safe_sqrt(sine2);
+    // Where the ray meets the sphere first, as its angle at the center (pbrt, 4th edition, section 6.2.4).
+    const float along = distance * cosine - safe_sqrt(r2 - d2 * sine2);
+    float s, c;
+    sine_cosine(2 * pi * v, s, c);
+    const Frame frame(to_center / (distance > 0 ? distance : 1));
+    const Vec3 w = frame.to_world({sine * c, sine * s, cosine});
+    const Vec3 seen = along * w - to_center;
+    // From within, or all but touching: anywhere on the sphere.
+    const Vec3 anywhere{sine * c, sine * s, cosine};
+    const float scale = 1 / length(seen);
+    const Vec3 n{outside ? scale * seen.x : anywhere.x, outside ? scale * seen.y : anywhere.y,
+                 outside ? scale * seen.z : anywhere.z};
+    return {center + radius * n, n, outside ? 1 / (2 * pi * part) : 0};
+}
+
+// What a spot sends where the angle to its axis has this cosine and sine.
+inline float spot_falloff(float full, float cutoff, float sine, float cosine) {
+    const float part = (cutoff - arc_tangent(sine, cosine)) / (cutoff - full);
+    return smaller(larger(part, 0), 1);
 }
 
 }  // namespace oracle
