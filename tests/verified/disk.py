@@ -152,6 +152,6 @@ def near_the_rim(draw):
 
 
 FORMS = [
-    Form("disk, anywhere", placed(receivers()), computed, exact, share=0.005),
+    Form("disk, anywhere", placed(receivers()), computed, exact, share=0.02),
     Form("disk, receiver next to the rim", placed(near_the_rim()), computed, exact, share=0.7),
 ]

@@ -1,7 +1,7 @@
 """Irradiance of environments against integrals over the sphere of directions in ball arithmetic.
 
-The map is integrated over the azimuth, after an elementary integral over the polar angle of what is above the
-receiver's horizon, which is where ``cot(polar) = -cos(azimuth) flat / upright``.
+The map is integrated over the polar angle of what is above the receiver's horizon, which is where ``cot(polar) =
+-cos(azimuth) flat / upright``, and then over the azimuth; both integrals are elementary.
 """
 
 import itertools
@@ -11,7 +11,20 @@ import numpy as np
 from flint import arb
 from hypothesis import strategies as st
 from verification import Form
-from verified.geometry import balls, between, cross, directions, dot, frame, integral, norm, number, powers_of_ten, unit
+from verified.geometry import (
+    balls,
+    between,
+    cross,
+    directions,
+    dot,
+    frame,
+    integral,
+    norm,
+    number,
+    powers_of_ten,
+    precise,
+    unit,
+)
 
 from oracle.emitters import Constant, CosineSky, Equirectangular, Receivers
 from oracle.irradiances import irradiance
@@ -89,35 +102,7 @@ def skies(draw):
 # --------------------------------------------------------------------------------------------------------- map
 
 
-def over_azimuths(function, start, end, flat, upright):
-    """Integral over the azimuth from the normal's, between kinks.
-
-    Where the horizon is nearly vertical it rushes through all polar angles beside the azimuths +-pi/2. There the
-    variable is t with ``tan(azimuth -+ pi/2) = upright/flat sinh(t)``, in which it does not.
-    """
-    ratio = abs(upright) / flat if flat > 0 else arb(1)
-    if upright == 0 or ratio > 0.2:
-        return integral(function, start, end)
-    eighth = arb.pi() / 4
-    inside = [eighth * k for k in range(-25, 26, 2) if start < eighth * k < end]
-    total = arb(0)
-    ends = [start, *inside, end]
-    for a, b in itertools.pairwise(ends):
-        quarters = round(float((a + b) / 4 / eighth))
-        if quarters % 2 == 0:
-            total += integral(function, a, b)
-            continue
-
-        quarter = 2 * eighth * quarters
-
-        def swept(t, quarter=quarter):
-            w = ratio * t.sinh()
-            return function(quarter + w.atan()) * ratio * t.cosh() / (1 + w * w)
-
-        total += integral(swept, ((a - quarter).tan() / ratio).asinh(), ((b - quarter).tan() / ratio).asinh())
-    return total
-
-
+@precise
 def exact_map(configuration):
     """Column by column, between the azimuths where the horizon passes from one row into the next."""
     radiance, up, front, normal = configuration
@@ -150,32 +135,39 @@ def exact_map(configuration):
 
 def over_column(start, end, radiance, polar, flat, upright):
     """Integral over a range of azimuths from the normal's, in which the horizon stays in one row."""
+    width, swing = end - start, flat * (end.sin() - start.sin())
 
-    def primitive(x, edge):
-        """Antiderivative of (x sin + upright cos) sin over the polar angle."""
-        return x * (edge - edge.sin() * edge.cos()) / 2 + upright * edge.sin() ** 2 / 2
+    def up_to(edge):
+        """Integral of (flat cos(azimuth) sin + upright cos) sin over polar angles up to a row's edge."""
+        return swing * (edge - edge.sin() * edge.cos()) / 2 + width * upright * edge.sin() ** 2 / 2
+
+    def up_to_horizon():
+        """There it is ``x (pi/2 + atan(x / upright)) / 2 + upright / 2`` with ``x = flat cos(azimuth)``, by parts."""
+        ratio = flat / upright
+        stretch = (1 + ratio * ratio).sqrt()
+
+        def primitive(azimuth):
+            s, c = azimuth.sin(), azimuth.cos()
+            # tan(stretched) = tan(azimuth) / stretch, in the same quarter.
+            stretched = azimuth + arb.atan2(s * c * (1 - stretch), stretch * c * c + s * s)
+            return flat * s * (ratio * c).atan() + upright * (stretch * stretched - azimuth)
+
+        return (swing * arb.pi() / 2 + width * upright + primitive(end) - primitive(start)) / 2
 
     middle = (start + end) / 2
     level = arb.pi() / 2 + (flat * middle.cos() / upright).atan() if upright != 0 else None
-    parts = []
-    for i, value in enumerate(radiance):
-        top, bottom = polar[i], polar[i + 1]
+    total = arb(0)
+    for value, top, bottom in zip(radiance, polar, polar[1:], strict=False):
         if level is None:
-            parts += [(value, top, bottom)] if middle.cos() > 0 else []
+            part = up_to(bottom) - up_to(top) if middle.cos() > 0 else arb(0)
+        elif bottom <= level if upright > 0 else top >= level:
+            part = up_to(bottom) - up_to(top)
         elif upright > 0:
-            parts += [(value, top, bottom)] if bottom <= level else [(value, top, None)] if top < level else []
+            part = up_to_horizon() - up_to(top) if top < level else arb(0)
         else:
-            parts += [(value, top, bottom)] if top >= level else [(value, None, bottom)] if bottom > level else []
-
-    def integrand(azimuth):
-        x = flat * azimuth.cos()
-        total = 0 * azimuth
-        for value, top, bottom in parts:
-            a, b = (arb.pi() / 2 + (x / upright).atan() if e is None else e + 0 * azimuth for e in (top, bottom))
-            total += arb(float(value)) * (primitive(x, b) - primitive(x, a))
-        return total
-
-    return over_azimuths(integrand, start, end, flat, upright) if parts else arb(0)
+            part = up_to(bottom) - up_to_horizon() if bottom > level else arb(0)
+        total += arb(float(value)) * part
+    return total
 
 
 def computed_map(configuration):

@@ -1,6 +1,7 @@
 """What the references share: vectors in ball arithmetic, and strategies for shapes and receivers."""
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -55,6 +56,27 @@ def integral(function, low, high, pieces=()):
     return sum((acb.integral(lambda z, _: function(z), a, b).real for a, b in pairwise(ends)), arb(0))
 
 
+def with_bits(*several):
+    """Run a reference with so many bits, and with more of them as long as its number is not known."""
+
+    def decorated(reference):
+        def run(configuration):
+            for bits in several:
+                with ctx.workprec(bits):
+                    found = reference(configuration)
+                if found is not None:
+                    return found
+            return None
+
+        return run
+
+    return decorated
+
+
+# Of these, the cancelling terms of far or thin shapes may take 150.
+precise = with_bits(256)
+
+
 def number(value, digits=14):
     """The middle of a ball as a float; None if it is wider than the digits asked for."""
     middle, radius = value.mid(), value.rad()
@@ -66,15 +88,22 @@ def number(value, digits=14):
 # ------------------------------------------------------------------------------------------------- strategies
 
 
+# Strategies are kept, for to set one up costs more than to draw from it.
+kept = lru_cache(maxsize=1000)
+
+
+@kept
 def between(low, high):
     return st.floats(low, high, allow_subnormal=False)
 
 
+@kept
 def powers_of_ten(low, high):
     """Log-uniform numbers."""
     return between(low, high).map(lambda exponent: 10.0**exponent)
 
 
+@kept
 @st.composite
 def directions(draw):
     """Unit vectors; the axes and planes of the coordinates are not rare."""
@@ -91,6 +120,7 @@ def frame(axis):
     return u, np.cross(axis, u)
 
 
+@kept
 @st.composite
 def receivers(draw, nearest=-6.0, furthest=6.0, within=3.0):
     """A point and a unit normal for a shape of size 1 in the plane z = 0: at 1e-6 to 1e6 sizes, facing anyhow.

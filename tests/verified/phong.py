@@ -253,7 +253,7 @@ def exact_albedo(configuration):
 FORMS = [
     form("Phong lobe over a polygon, axial moment", False, 0.05, -2, 2),
     form("Phong lobe over a polygon, double-axis moment", True, 0.1, -2, 2),
-    # Near the polygon's plane, what a horizon leaves is a sliver or ends below the receiver, and ulps of directions tell.
+    # Near the polygon's plane, horizons leave slivers or pass below the receiver, and ulps of directions tell.
     form("Phong lobe over a polygon, axial moment, 1e-6 to 1e6 sizes away", False, 0.55, -6, 6),
     form("Phong lobe over a polygon, double-axis moment, 1e-6 to 1e6 sizes away", True, 0.55, -6, 6),
     # Needles 0.1 to 1e-3 thin. Unless small in all, their long edges nearly cancel and digits go with the width:

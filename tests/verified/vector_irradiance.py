@@ -1,13 +1,13 @@
 """Vector irradiance against integrals of its definition in ball arithmetic, one component of it at a time.
 
 Flat shapes are integrated in polar coordinates around the receiver's foot (polygons) or their centre (disks), where one
-of both integrals is elementary, and not along their contour as `oracle` does.
+or both integrals are elementary, and not along their contour as `oracle` does.
 """
 
 import math
 
 import numpy as np
-from flint import arb, ctx
+from flint import acb, arb
 from hypothesis import strategies as st
 from verification import Form
 from verified import line, point_like
@@ -25,6 +25,7 @@ from verified.geometry import (
     norm,
     number,
     powers_of_ten,
+    precise,
     receivers,
     times,
     unit,
@@ -73,45 +74,44 @@ def computed_line(configuration):
 # ------------------------------------------------------------------------------------------------------- shapes
 
 
+@precise
 def exact_polygon(configuration):
-    """In polar coordinates (rho, f) around the foot, the integral over rho from 0 to an edge is elementary."""
+    """Polar coordinates around the foot, from it to each edge: by the radius, and by parts over the angle."""
     (vertices, point, two_sided), axis = configuration
-    with ctx.workprec(320):
-        p = balls(point)
-        offsets = [minus(balls(vertex), p) for vertex in vertices]
-        edges = [minus(b, a) for a, b in zip(offsets, offsets[1:] + offsets[:1], strict=True)]
-        area = [arb(0)] * 3
-        for a, b in zip(offsets, edges, strict=True):
-            area = [x + y for x, y in zip(area, cross(a, b), strict=True)]
-        w = unit(area)
-        h = -dot(w, offsets[0])
-        if vertices[:, 2].any() and abs(h) < 1e-15 * float(norm(edges[0])):
-            return None
-        if h == 0 or (h < 0 and not two_sided):
-            return 0.0
-        side, h = (-1 if h > 0 else 1), abs(h)
-        total = arb(0)
-        for start, edge in zip(offsets, edges, strict=True):
-            length, along = norm(edge), unit(edge)
-            # The edge's line in the plane: its point nearest to the foot at the signed distance d along `out`.
-            out = cross(along, w)
-            d = dot(out, start)
-            if not abs(d) > 0:
-                continue
-            first = dot(along, start)
+    p = balls(point)
+    offsets = [minus(balls(vertex), p) for vertex in vertices]
+    edges = [minus(b, a) for a, b in zip(offsets, offsets[1:] + offsets[:1], strict=True)]
+    area = [arb(0)] * 3
+    for a, b in zip(offsets, edges, strict=True):
+        area = [x + y for x, y in zip(area, cross(a, b), strict=True)]
+    w = unit(area)
+    h = -dot(w, offsets[0])
+    if vertices[:, 2].any() and abs(h) < 1e-15 * float(norm(edges[0])):
+        return None
+    if h == 0 or (h < 0 and not two_sided):
+        return 0.0
+    side, h = (-1 if h > 0 else 1), abs(h)
+    total = arb(0)
+    for start, edge in zip(offsets, edges, strict=True):
+        length, along = norm(edge), unit(edge)
+        # The edge's line in the plane: its point nearest to the foot at the signed distance d along `out`.
+        out = cross(along, w)
+        d = dot(out, start)
+        if not abs(d) > 0:
+            continue
+        first = dot(along, start)
+        away = (d * d + h * h).sqrt()
 
-            def integrand(x, d=d, along=along, out=out):
-                s = abs(d) * x.sinh()
-                squared = d * d + s * s
-                rho = squared.sqrt()
-                upright = squared / (h * h + squared) / 2
-                flat = ((rho / h).atan() - h * rho / (h * h + squared)) / 2 / rho
-                # d f = d ds / rho^2
-                turned = d * abs(d) * x.cosh() / squared
-                return turned * (side * w[axis] * upright + flat * (out[axis] * d + along[axis] * s))
+        def primitive(s, d=d, along=along, out=out, away=away):
+            # Radius rho and angle f = atan(s / d): over rho remain ``rho^2 / (h^2 + rho^2) / 2`` upright, and across
+            # ``(atan(rho / h) - h rho / (h^2 + rho^2)) / 2``, times the direction's cosine or sine.
+            rho = (d * d + s * s).sqrt()
+            upright = d * (s / away).atan() / away
+            flat, turned = (rho / h).atan() / rho, (s / away).atan() / away
+            return side * w[axis] * upright + out[axis] * (s * flat - h * turned) - along[axis] * d * flat
 
-            total += integral(integrand, (first / abs(d)).asinh(), ((first + length) / abs(d)).asinh())
-        return number(total)
+        total += (primitive(first + length) - primitive(first)) / 2
+    return number(total)
 
 
 def computed_polygon(configuration):
@@ -119,6 +119,7 @@ def computed_polygon(configuration):
     return of(Area(Polygon(vertices), [1.0], two_sided), point, axis)
 
 
+@precise
 def exact_disk(configuration):
     """Ring by ring: a ring's integrals of 1/d^4 and cos(f)/d^4 are elementary."""
     (center, normal, radius, point, two_sided), axis = configuration
@@ -134,16 +135,22 @@ def exact_disk(configuration):
     rho = norm(flat) if any(not x.contains(0) for x in flat) else arb(0)
     u = times(flat, 1 / rho) if rho > 0 else [arb(0)] * 3
 
-    def ring(x):
-        # Radius by its difference from rho, at which the integrand is narrow if h is small.
-        r = rho + abs(h) * x.sinh()
-        d, f = rho * rho + h * h + r * r, 2 * rho * r
-        cubed = (h * h * x.cosh() ** 2 * (h * h + (r + rho) ** 2)).sqrt() ** 3
-        components = u[axis] * (rho * d - r * f) + w[axis] * h * d
-        return 2 * arb.pi() * r * components / cubed * abs(h) * x.cosh()
+    r = ball(radius)
+    if not rho > 0:
+        # With t = r^2, the ring's 1/d^4.
+        return number(h * abs(h) * integral(lambda t: arb.pi() * w[axis] / (t + h * h) ** 2, 0, r * r))
+    # With d^2 = t + rho^2 + h^2 - 2 rho r cos(f), the integrals over f have the third power of
+    # sqrt((t - rho^2 + h^2)^2 + (2 h rho)^2) below; let that be 2 h rho cosh(y).
+    scale, shift = 2 * abs(h) * rho, rho * rho - h * h
 
-    low, high = (-rho / abs(h)).asinh(), ((ball(disk.radius) - rho) / abs(h)).asinh()
-    return number(abs(h) * integral(ring, low, high))
+    def ring(y):
+        t = shift + scale * y.sinh()
+        d = rho * rho + h * h + t
+        return (u[axis] * rho * (d - 2 * t) + w[axis] * h * d) / y.cosh() ** 2
+
+    low, high = (-shift / scale).asinh(), ((r * r - shift) / scale).asinh()
+    total = acb.integral(lambda y, _: ring(y), low, high, rel_tol=arb(2) ** -90).real
+    return number(arb.pi() * abs(h) * total / scale**2)
 
 
 def computed_disk(configuration):

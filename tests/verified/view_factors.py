@@ -7,23 +7,23 @@ import numpy as np
 from flint import acb, arb, ctx
 from hypothesis import strategies as st
 from verification import Form
-from verified.geometry import ball, balls, between, cross, dot, minus, norm, number, plus, powers_of_ten, times
+from verified.geometry import (
+    ball,
+    balls,
+    between,
+    cross,
+    dot,
+    minus,
+    norm,
+    number,
+    plus,
+    powers_of_ten,
+    precise,
+    times,
+)
 
 from oracle import view_factors
 from oracle.shapes import Disk, Polygon, Rectangle, Sphere
-
-
-def precise(reference):
-    """Run a reference with 256 bits, of which the cancelling terms of far or thin shapes may take 150."""
-
-    def with_more_bits(configuration):
-        before, ctx.prec = ctx.prec, 256
-        try:
-            return reference(configuration)
-        finally:
-            ctx.prec = before
-
-    return with_more_bits
 
 
 def integral(function, low, high):
@@ -69,17 +69,34 @@ def ends(a, b, offset):
     return [offset - wide, offset - narrow, offset + narrow, offset + wide]
 
 
+with ctx.workprec(256):
+    GAUSS = [arb.legendre_p_root(20, k, weight=True) for k in range(20)]
+
+
 def over_differences(strips, u, unit):
-    """Integral over two intervals with differences u of a function of the difference, which is ``unit sinh(t)``."""
+    """Integral over two intervals with differences u of a function of the difference, which is ``unit sinh(t)``.
+
+    What the strips send is analytic where Im t is below pi/2: Gauss's rule with 20 nodes on panels no longer than 2,
+    whose error falls as 3.4^-40, leaves 1e-20 of it.
+    """
     t = [(x / unit).asinh() for x in u]
-
-    def along(t, weight):
-        difference = unit * acb(t).sinh()
-        return weight(difference) * strips(t, difference) * unit * acb(t).cosh()
-
-    total = integral(lambda z: along(z, lambda d: d - u[0]), t[0], t[1])
-    total += integral(lambda z: along(z, lambda d: u[1] - u[0]), t[1], t[2])
-    return total + integral(lambda z: along(z, lambda d: u[3] - d), t[2], t[3])
+    total = arb(0)
+    for low, high, weight in (
+        (t[0], t[1], lambda difference: difference - u[0]),
+        (t[1], t[2], lambda difference: u[1] - u[0]),
+        (t[2], t[3], lambda difference: u[3] - difference),
+    ):
+        if not low < high:
+            continue
+        panels = math.ceil(float(high - low) / 2)
+        half = (high - low) / (2 * panels)
+        for panel in range(panels):
+            for node, factor in GAUSS:
+                z = low + (2 * panel + 1 + node) * half
+                grown = z.exp()
+                difference, length = unit * (grown - 1 / grown) / 2, unit * (grown + 1 / grown) / 2
+                total += weight(difference) * strips(difference, length) * length * (factor * half)
+    return total
 
 
 @precise
@@ -90,9 +107,8 @@ def exact_parallel(configuration):
     a, c, b, d = source.half_u[0], source.half_v[1], target.half_v[0], target.half_u[1]
     v, gap = ends(c, d, y), ball(gap)
 
-    def strips(t, _):
-        r = gap * acb(t).cosh()
-        second = sum(sign * v[i] * (v[i] / r).atan() for i, sign in enumerate((1, -1, -1, 1)))
+    def strips(_, r):
+        second = sum(sign * x * (x / r).atan() for x, sign in zip(v, (1, -1, -1, 1), strict=True))
         return gap**2 * second / (2 * arb.pi() * r**3)
 
     return number(over_differences(strips, ends(a, b, x), gap) / (4 * ball(a) * ball(c)))
@@ -122,9 +138,11 @@ def exact_perpendicular(configuration):
     touching = y1 == 0 and z1 == 0
     squares = [y2**2 + z1**2, y1**2 + z2**2, y2**2 + z2**2] + ([] if touching else [y1**2 + z1**2])
 
-    def strips(_, difference):
-        logs = [(difference * difference + square).log(analytic=True) for square in squares]
-        return (logs[0] + logs[1] - sum(logs[2:])) / (4 * arb.pi())
+    def strips(difference, _):
+        arguments = [difference * difference + square for square in squares]
+        if touching:
+            return (arguments[0] * arguments[1] / arguments[2]).log() / (4 * arb.pi())
+        return (arguments[0] * arguments[1] / (arguments[2] * arguments[3])).log() / (4 * arb.pi())
 
     total = over_differences(strips, u, min(squares).sqrt())
     if touching:
@@ -311,8 +329,8 @@ def between_edges(a, b, c, d):
 
 
 FORMS = [
-    Form("view factor of parallel rectangles", parallel(), computed, exact_parallel, share=0.06),
-    Form("view factor of perpendicular rectangles", perpendicular(), computed, exact_perpendicular, share=0.05),
+    Form("view factor of parallel rectangles", parallel(), computed, exact_parallel, share=0.1),
+    Form("view factor of perpendicular rectangles", perpendicular(), computed, exact_perpendicular, share=0.07),
     Form("view factor of coaxial disks", coaxial(), lambda c: computed(disks(c)), exact_disks),
     Form("view factor from a sphere to a disk", spheres(), lambda c: computed(sphere_and_disk(c)), exact_sphere),
     Form("view factor by crossed strings", strips(), crossed, exact_strings, share=0.05),
