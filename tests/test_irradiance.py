@@ -419,6 +419,44 @@ def test_a_polygon_with_reversed_corners_shines_to_the_other_side():
     )
 
 
+# Where rounding of the needle's own normal moves its plane by more than the receiver is above it.
+ALMOST_IN_ITS_PLANE = [
+    [0.9903945457354207, 0.13827018397879376, 0.0],
+    [-0.9903945457354207, -0.13827018397879376, 0.0],
+    [-0.8313674633608771, -0.11606823647622681, 2.7719696032510957e-07],
+]
+
+
+@pytest.mark.parametrize(
+    ("corners", "point", "normal", "expected"),
+    [
+        (
+            ALMOST_IN_ITS_PLANE,
+            [-0.9659445634491785, -0.12915754053451892, -0.09642455089642986],
+            [0.8137347730452955, 0.07957613732039012, 0.5757632825268453],
+            8.38195653158964e-18,
+        ),
+        # So far away that the difference form counts, in the longer numbers that its cancellation asks for.
+        (
+            [[-1, 0, 0], [1, 0, 0], [-0.4834509913, 1.85734e-07, 0]],
+            [-1.91, 2.24, 7.44],
+            unit([-0.192, -0.958, 0.214]),
+            7.58921692463740299e-11,
+        ),
+        (
+            [[-1, 0, 0], [1, 0, 0], [0, 3.8909e-05, 0]],
+            [-3.2, 3.41, 6.96],
+            unit([-0.504, -0.829, -0.243]),
+            1.5986300363098575e-7,
+        ),
+    ],
+)
+def test_bounds_hold_for_needles(corners, point, normal, expected):
+    # Expected is the contour integral in 60 digits.
+    got = irradiance(Area(Polygon(corners), ONE), Receivers(point, normal))
+    assert abs(got.value[0] - expected) <= got.error[0]
+
+
 @pytest.mark.parametrize("point", [[3, 0, 0], [1.5, -4, 0], [0, 1.0001, 0]])
 def test_a_receiver_in_the_plane_of_a_flat_light_is_dark(point):
     for light, _ in area_lights()[:3]:

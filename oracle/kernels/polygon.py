@@ -68,10 +68,11 @@ def polygon(shape: Polygon, points: Floats, normals: Floats, two_sided: bool) ->
     height = _dot(w, away)
     # From behind, the vertices go round the other way.
     value = np.abs(seen.value) if two_sided else np.maximum(seen.value, 0.0)
-    value = np.where(height != 0 if two_sided else height > 0, value, 0.0)
     # So near to the plane that the side is uncertain, all may be wrong.
     uncertain = np.abs(height) < _ROUNDINGS * _EPSILON * _dot(np.abs(w) + (w != 0), np.abs(away))
-    return Bounded(value, np.where(uncertain, seen.error + np.abs(seen.value), seen.error))
+    # The normal of a needle may be wrong by more; what is seen for certain is seen from the front.
+    sees = height != 0 if two_sided else (height > 0) | (seen.value > seen.error) & ~uncertain
+    return Bounded(np.where(sees, value, 0.0), seen.error + np.where(uncertain | ~sees, value, 0.0))
 
 
 def contour(offsets: Floats, normals: Floats, relative: Floats) -> Bounded:
@@ -125,20 +126,20 @@ def _contour(vertices: Reals, points: Reals, relative: Reals, n: Reals) -> tuple
     above = heights.max(axis=0) > 0
     far = _dot(centered, centered).max(axis=0) < _FAR * _dot(center, center)
 
-    arguments = offsets, centered, heights, n
     value, error = np.zeros(n.shape[1], n.dtype), np.zeros(n.shape[1], n.dtype)
-    for form, which in ((_near_contour, np.flatnonzero(above & ~far)), (_far_contour, np.flatnonzero(above & far))):
-        if len(which) == n.shape[1]:
-            return form(*arguments)
-        if len(which):
-            value[which], error[which] = form(*(_some(array, which) for array in arguments))
+    for form, shape, which in ((_near_contour, relative, above & ~far), (_far_contour, centered, above & far)):
+        index = np.flatnonzero(which)
+        if len(index) == len(which):
+            return form(offsets, shape, heights, n)
+        if len(index):
+            value[index], error[index] = form(*(_some(array, index) for array in (offsets, shape, heights, n)))
     return value, error
 
 
-def _near_contour(offsets: Reals, centered: Reals, heights: Reals, n: Reals) -> tuple[Reals, Reals]:
+def _near_contour(offsets: Reals, relative: Reals, heights: Reals, n: Reals) -> tuple[Reals, Reals]:
     """Sum over the edges of angle times axis."""
     count = n.shape[1]
-    start, end, edges = offsets[:, :-1], offsets[:, 1:], centered[:, 1:] - centered[:, :-1]
+    start, end, edges = offsets[:, :-1], offsets[:, 1:], relative[:, 1:] - relative[:, :-1]
     squared = _dot(offsets, offsets)
     axes = _cross(start, edges)
     # Both ends give the same axis; one that is much nearer loses fewer digits.
@@ -152,13 +153,15 @@ def _near_contour(offsets: Reals, centered: Reals, heights: Reals, n: Reals) -> 
     above = heights >= 0
     cut = None if above.all() else _Crossings.of(offsets, heights, above)
     if cut is not None:
-        sines.reshape(-1)[cut.edge] *= cut.part
+        whole = sines.take(cut.edge)
+        sines.reshape(-1)[cut.edge] = cut.part * whole
         cosines.reshape(-1)[cut.edge] = _dot(cut.inside, cut.points)
-    # An edge that points at the receiver, or has no length, subtends no angle.
-    factors = _angles(sines, cosines) / (sines + (sines == 0))
+    factors = _angles(sines, cosines)
     if cut is not None:
-        factors.reshape(-1)[cut.edge] *= cut.part
+        sines.reshape(-1)[cut.edge] = whole
         factors *= above[:-1] | above[1:]
+    # An edge that points at the receiver, or has no length, subtends no angle.
+    factors /= sines + (sines == 0)
     moments *= factors
     magnitudes *= factors
     total, magnitude = moments.sum(axis=0), magnitudes.sum(axis=0)
@@ -167,9 +170,9 @@ def _near_contour(offsets: Reals, centered: Reals, heights: Reals, n: Reals) -> 
         sine = _dot(_some(n, owner), _cross(x, y))
         np.add.at(total, owner, np.copysign(_angles(np.abs(sine), _dot(x, y)), sign * sine))
         # Rounding displaces the crossings by ulps of the edge's distance.
-        farthest = np.maximum(squared.take(cut.edge), squared.take(cut.edge + count))
-        distance = _dot(cut.points, cut.points)
-        np.add.at(magnitude, cut.owner, 0.5 + 0.5 * np.sqrt(farthest / (distance + (distance == 0))))
+        farthest = np.sqrt(np.maximum(squared.take(cut.edge), squared.take(cut.edge + count)))
+        distance = np.sqrt(_dot(cut.points, cut.points))
+        np.add.at(magnitude, cut.owner, 0.5 + 0.5 * farthest / (distance + (distance == 0)))
     return total / -2, _ROUNDINGS * np.finfo(n.dtype).eps / 2 * magnitude
 
 
@@ -298,15 +301,15 @@ class _Distant:
 
 
 # theta/sin(theta) - 1 in powers of q = sin^2(theta/2): with asin(s)/(s sqrt(1-s^2)) = sum (4 q)^k / ((2k+1) C(2k,k)).
-_SERIES = [1.0]
-for _k in range(1, 13):
-    _SERIES.append(_SERIES[-1] * 2 * _k / (2 * _k + 1))
+_TWICE = 2 * np.arange(1, 13).astype(np.longdouble)
+_SERIES = np.cumprod(_TWICE / (_TWICE + 1))
 
 
 def _angle_over_sine(q: Reals) -> Reals:
     """``theta/sin(theta) - 1`` of angles with ``q = sin^2(theta/2)``, up to 0.35 rad."""
-    result = q * _SERIES[-1]
-    for coefficient in reversed(_SERIES[1:-1]):
+    *lower, highest = _SERIES.astype(q.dtype)
+    result: Reals = q * highest
+    for coefficient in reversed(lower):
         result += coefficient
         result *= q
     return result
