@@ -464,6 +464,12 @@ def test_a_receiver_in_the_plane_of_a_flat_light_is_dark(point):
             assert of(light, point, normal) == 0
 
 
+@pytest.mark.parametrize("point", [[0.1, 0.2, 0], [0.999998, -0.999999, 0]])
+def test_a_receiver_on_a_polygon_is_dark(point):
+    assert of(Area(Polygon(SQUARE), ONE), point, unit([0.1, 0.2, -1])) == 0
+    assert of(Area(Polygon(SQUARE), ONE), point, unit([0.1, 0.2, 1])) == 0
+
+
 def test_a_receiver_in_the_plane_of_a_turned_polygon_is_dark():
     x, y, z = unit([1, 2, 3]), *orthonormal([1, 2, 3])
     rotation = np.column_stack([y, z, x])

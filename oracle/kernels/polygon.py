@@ -71,8 +71,10 @@ def polygon(shape: Polygon, points: Floats, normals: Floats, two_sided: bool) ->
     # So near to the plane that the side is uncertain, all may be wrong.
     uncertain = np.abs(height) < _ROUNDINGS * _EPSILON * _dot(np.abs(w) + (w != 0), np.abs(away))
     # The normal of a needle may be wrong by more; what is seen for certain is seen from the front.
-    sees = height != 0 if two_sided else (height > 0) | (seen.value > seen.error) & ~uncertain
-    return Bounded(np.where(sees, value, 0.0), seen.error + np.where(uncertain | ~sees, value, 0.0))
+    certain = (seen.value > seen.error) & ~uncertain
+    sees = height != 0 if two_sided else (height > 0) | (height < 0) & certain
+    missed = np.where(uncertain, np.abs(seen.value), np.where(sees | (height == 0), 0.0, value))
+    return Bounded(np.where(sees, value, 0.0), seen.error + missed)
 
 
 def contour(offsets: Floats, normals: Floats, relative: Floats) -> Bounded:
