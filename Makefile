@@ -31,7 +31,9 @@ sanitize: setup ## the tracer's tests under AddressSanitizer and UndefinedBehavi
 	ASAN_OPTIONS=detect_leaks=0 \
 	LD_PRELOAD="$$($$compiler -print-file-name=libasan.so):$$($$compiler -print-file-name=libstdc++.so)" \
 	PYTHONPATH="$(CURDIR)/build/sanitize/site:$$packages" \
-	.venv/bin/python -SP -m pytest -p no:cacheprovider --capture=no tests/test_tracer.py
+	.venv/bin/python -SP -m pytest -p no:cacheprovider --capture=no -q tests/test_tracer.py tests/test_tracing.py \
+	    tests/test_traced_samplers.py tests/test_traced_textures.py tests/test_traced_media.py \
+	    tests/test_traced_light.py::test_a_diffuse_surface_reflects_the_light_of_every_emitter
 
 # The wheel is made from the source archive, outside of the checkout. auditwheel puts Embree and TBB into it, and names the
 # oldest system on which it runs.
