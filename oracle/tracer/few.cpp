@@ -111,7 +111,7 @@ bool Few::Exact::meets(const Vec3& o, const Vec3& d, double limit, int index, Hi
     const double u = along(rows.to_u, x, y, z) + rows.to_u[3], v = along(rows.to_v, x, y, z) + rows.to_v[3];
     if (!(u >= -inclusive && v >= -inclusive && u <= 1 + inclusive)) return false;
     if (!((parallelogram ? v : u + v) <= 1 + inclusive)) return false;
-    hit = {t, index, float(u), float(v)};
+    hit.distance = t, hit.index = index, hit.u = float(u), hit.v = float(v);
     return true;
 }
 
@@ -190,7 +190,7 @@ void Few::closest(const Rays& rays, Hit* hits) const {
     int32_t screens[side_by_side], alone[side_by_side];
     scan_closest(rays, screens, alone);
     for (int k = 0; k < side_by_side; ++k) {
-        hits[k] = {};
+        hits[k].distance = std::numeric_limits<double>::infinity(), hits[k].index = none;
         if (screens[k] == none) continue;
         const Vec3 o = rays.origin(k), d = rays.direction(k);
         if (alone[k]) {

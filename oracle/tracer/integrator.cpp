@@ -352,7 +352,7 @@ void measure(const Scene& scene, const Sensor& sensor, const Film& film, const M
              const Sampler& sampler, int count, Color* results) {
     Path paths[batch];
     Surface surfaces[batch];
-    Connection connections[batch] = {};
+    Connection connections[batch];
     const bool at_meter = sensor.kind == Sensor::Kind::irradiance_meter;
     // The paths that go on.
     int alive[batch], living = 0;
@@ -370,6 +370,7 @@ void measure(const Scene& scene, const Sensor& sensor, const Film& film, const M
     if (at_meter) {
         draws.draw(scene, sampler, step++);
         for (int i = 0; i < count; ++i) {
+            connections[i].light = {};
             const Vec2 position = film_position(film, x, y, {film_block.a[i], film_block.b[i]});
             if (begin_at_meter(scene, method, sensor, position, paths[i], draws.of(i), connections[i])) alive[living++] = i;
         }
