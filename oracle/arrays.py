@@ -40,7 +40,9 @@ def finite(name: str, value: ArrayLike, trailing: tuple[int, ...] = ()) -> Float
 def position(name: str, value: ArrayLike, trailing: tuple[int, ...] = (3,)) -> Floats:
     """Like `finite`, for coordinates [m]: none beyond `LARGEST`."""
     array = finite(name, value, trailing)
-    _refuse(name, array, np.abs(array) > LARGEST, f"is {{}}, coordinates lie within {LARGEST:g} m")
+    # Magnitudes would take as much memory as the points of a map once more.
+    beyond = (array > LARGEST) | (array < -LARGEST)
+    _refuse(name, array, beyond, f"is {{}}, coordinates lie within {LARGEST:g} m")
     return array
 
 
