@@ -1,4 +1,4 @@
-// Reflection by diffuse surfaces under a few flat emitters, for the paths of a batch at once: what scenes mostly consist of.
+// Reflection by diffuse surfaces under a few emitters, for the paths of a batch at once: what scenes mostly consist of.
 // It is what the integrator does for one path at any surface, as loops that compilers make vectors of.
 #pragma once
 

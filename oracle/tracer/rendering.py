@@ -19,7 +19,7 @@ from oracle.tracer import _core, stage
 from oracle.tracer.scene import Film, IrradianceMeter, Scene, Sensor
 
 # Changes whenever the same scene, seed and samples give other images than before.
-VERSION = 1
+VERSION = 2
 
 Strategy: TypeAlias = Literal["light", "bsdf", "hemisphere", "mis"]
 Sampler: TypeAlias = Literal["sobol", "independent"]
