@@ -1,8 +1,14 @@
-"""Cosine powers around an axis, integrated over polygons clipped at two horizons: what `phong` is computed with."""
+"""Cosine powers around an axis, integrated over polygons clipped at two horizons: what `phong` is computed with.
+
+Receivers close to the polygon's plane see slivers, whose contours cancel, and edges that pass them so closely that an
+ulp of a vertex turns them. What float64 loses there, the processor's longer floats keep, where it has them.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +19,15 @@ from oracle.shapes import Polygon
 _EPSILON = float(np.finfo(np.float64).eps)
 # A power of the cosine that has decayed by this exponent along an edge is lost in float64.
 GONE = 38.0
-_EDGE_NODES, _EDGE_WEIGHTS = np.polynomial.legendre.leggauss(48)
+# With a larger relative error than this, results are computed once more in longer floats.
+_GOOD = 1e-11
+# Points of a Gauss rule along an edge, along each side of a small triangle, and where the power is gone.
+_FLOAT64 = (48, 12, GONE)
+_LONGER = (72, 20, 46.0)
 # Polygons no larger than this as an angle, and over which the power varies no more than this exponent, are integrated
 # over their area; the contour would cancel.
 _SMALL = 0.12
 _VARIATION = 4.0
-_AREA_NODES, _AREA_WEIGHTS = np.polynomial.legendre.leggauss(12)
 # Where the power stays below this on the whole contour, the constant of the potential is left out.
 _TAIL = 1e-3
 
@@ -54,7 +63,7 @@ class _Seen:
         reach = np.sqrt(dot(self.offsets, self.offsets))
         reach = np.maximum(reach, np.roll(reach, -1, axis=1))
         along = np.sqrt(dot(edges, edges))
-        rounding = 4 * _EPSILON * reach
+        rounding = 4 * float(np.finfo(reach.dtype).eps) * reach
         doubt = rounding * np.minimum(along / np.abs(fall), 1e6) if doubtful else np.zeros_like(reach)
 
         # Each vertex is followed by the crossing of its edge; those that exist come first, the last one is repeated.
@@ -79,15 +88,32 @@ class _Seen:
 
 def moment(polygon: Polygon, points: Floats, normals: Floats, axes: Floats, n: int, double: bool) -> Bounded:
     """Moments (N,) at receivers (N, 3): axial ones, or double-axis ones with the receiver's normal."""
-    relative = polygon.vertices - polygon.vertices[0]
-    offsets = polygon.vertices[None] - points[:, None]
-    front = polygon.normal
+    found = _moment(np.float64, polygon, points, normals, axes, n, double)
+    poor = found.error > _GOOD * found.value
+    if np.finfo(np.longdouble).eps < _EPSILON and poor.any():
+        longer = _moment(np.longdouble, polygon, points[poor], normals[poor], axes[poor], n, double)
+        found.value[poor] = longer.value
+        found.error[poor] = longer.error + _EPSILON * found.value[poor]
+    return found
+
+
+def _moment(
+    kind: Any, polygon: Polygon, points: Floats, normals: Floats, axes: Floats, n: int, double: bool
+) -> Bounded:
+    """Moments in floats of the given kind."""
+    epsilon = float(np.finfo(kind).eps)
+    vertices, points = np.asarray(polygon.vertices, dtype=kind), np.asarray(points, dtype=kind)
+    normals, axes = (v / np.sqrt(dot(v, v))[:, None] for v in (np.asarray(w, dtype=kind) for w in (normals, axes)))
+    relative = vertices - vertices[0]
+    front = np.cross(relative[1:-1], relative[2:]).sum(axis=0)
+    front = front / np.sqrt(dot(front, front))
+    offsets = vertices[None] - points[:, None]
     height = -np.einsum("ni,i->n", offsets[:, 0], front)
     # The normal is rounded too, more so that of a thin polygon.
     size = float(np.abs(relative).max())
-    doubt = _EPSILON * (4 + 4 * size**2 / polygon.area) * np.sqrt(dot(offsets[:, 0], offsets[:, 0]))
+    doubt = epsilon * (4 + 4 * size**2 / polygon.area) * np.sqrt(dot(offsets[:, 0], offsets[:, 0]))
 
-    exact = np.zeros(offsets.shape[:2])
+    exact = np.zeros(offsets.shape[:2], dtype=kind)
     seen = _Seen(offsets, np.broadcast_to(relative, offsets.shape), exact, exact)
     # On the clipped horizon the double-axis integrand is 0, and on the lobe's any power is: errors there do not tell.
     seen = seen.clipped(normals, doubtful=not double).clipped(axes, doubtful=n == 0)
@@ -101,7 +127,7 @@ def moment(polygon: Polygon, points: Floats, normals: Floats, axes: Floats, n: i
     tame = (z > 3 * angle) & (n * angle * (sine + angle) <= _VARIATION * (z - angle))
     small = (angle <= _SMALL) & ((n <= 6) | tame)
 
-    value, error = np.zeros(len(points)), np.zeros(len(points))
+    value, error = np.zeros(len(points), dtype=kind), np.zeros(len(points), dtype=kind)
     for here, method in ((small, _over_area), (~small, _over_contour)):
         if here.any():
             what = _Seen(seen.offsets[here], seen.relative[here], seen.doubt[here], seen.rounding[here])
@@ -111,6 +137,27 @@ def moment(polygon: Polygon, points: Floats, normals: Floats, axes: Floats, n: i
     # So near to the plane that the side is uncertain, all may be wrong.
     error = error + np.where(np.abs(height) <= doubt, value, 0)
     return Bounded(np.where(height > 0, value, 0), np.where(height > -doubt, error, 0))
+
+
+def _precision(numbers: Floats) -> tuple[float, tuple[int, int, float]]:
+    """What rounding may do to such numbers, and how exact quadrature has to be for them."""
+    return float(np.finfo(numbers.dtype).eps), _FLOAT64 if numbers.dtype == np.float64 else _LONGER
+
+
+@cache
+def _rule(order: int, kind: np.dtype[Any]) -> tuple[Floats, Floats]:
+    """Gauss's nodes and weights on [-1, 1] in floats of the given kind, by Newton's method from those in float64."""
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    if kind == np.float64:
+        return nodes, weights
+    nodes = nodes.astype(kind)
+    for _ in range(2):
+        last, value = np.ones_like(nodes), nodes
+        for k in range(2, order + 1):
+            last, value = value, ((2 * k - 1) * nodes * value - (k - 1) * last) / k
+        slope = order * (nodes * value - last) / (nodes**2 - 1)
+        nodes = nodes - value / slope
+    return nodes, 2 / ((1 - nodes**2) * slope**2)
 
 
 def _misplaced(seen: _Seen, moved: Floats, peak: Floats) -> Floats:
@@ -136,9 +183,11 @@ def _over_area(
     a, b = seen.relative[:, 1:-1] - first, seen.relative[:, 2:] - first
     if not a.shape[1]:
         return Bounded(np.zeros(len(height)), np.zeros(len(height)))
+    epsilon, (_, order, _) = _precision(height)
+    nodes, along_side = _rule(order, height.dtype)
     doubled = np.einsum("nti,i->nt", np.cross(a, b), front)
-    x, y = (1 + _AREA_NODES) / 2, (1 + _AREA_NODES) / 2
-    weights = np.outer(x * _AREA_WEIGHTS, _AREA_WEIGHTS) / 4
+    x, y = (1 + nodes) / 2, (1 + nodes) / 2
+    weights = np.outer(x * along_side, along_side) / 4
     sides = a[:, :, None, None] + y[:, None] * (b - a)[:, :, None, None]
     place = seen.offsets[:, :1, None, None] + x[:, None, None] * sides
     squared = dot(place, place)
@@ -155,11 +204,11 @@ def _over_area(
     # Directions are off by some ulp: the power changes by n tan(angle) of itself, the cosine by an ulp of 1.
     turned = n * np.sqrt(np.clip(1 - z**2, 0, 1)) * z ** max(n - 1, 0) * cosine + (power if double else 0)
     size = np.abs(element)
-    error = (size * (16 * power * cosine + 4 * turned)).sum(axis=(1, 2, 3)) * _EPSILON
+    error = (size * (16 * power * cosine + 4 * turned)).sum(axis=(1, 2, 3)) * epsilon
     error += np.abs(value) * doubt / np.maximum(np.abs(height), np.finfo(np.float64).tiny)
     # The area of what is left of an edge-on triangle is a difference.
     scale = np.sqrt(dot(a, a) * dot(b, b)) * weights.sum()
-    rough = 4 * _EPSILON * scale * np.abs(height)[:, None] / (squared * length).min(axis=(2, 3))
+    rough = 4 * epsilon * scale * np.abs(height)[:, None] / (squared * length).min(axis=(2, 3))
     error += (rough * (power * cosine).max(axis=(2, 3))).sum(axis=1)
     return Bounded(value, error + _misplaced(seen, seen.doubt, (power * cosine).max(axis=(1, 2, 3))))
 
@@ -183,6 +232,9 @@ def _over_contour(
     seen: _Seen, front: Floats, height: Floats, doubt: Floats, normals: Floats, axes: Floats, n: int, double: bool
 ) -> Bounded:
     """Gauss rule over each edge's arc."""
+    epsilon, (order, _, gone) = _precision(height)
+    nodes, along_edge = _rule(order, height.dtype)
+    pi = 4 * np.arctan(height.dtype.type(1))
     start, end = seen.offsets, np.roll(seen.offsets, -1, axis=1)
     edge = np.roll(seen.relative, -1, axis=1) - seen.relative
     lengths = [np.sqrt(dot(v, v)) for v in (start, end, edge)]
@@ -192,7 +244,7 @@ def _over_contour(
     area = np.sqrt(dot(cross, cross))
     exists = area > 0
     shorter = np.sort(lengths, axis=0)
-    blur = np.minimum(4 * _EPSILON * shorter[0] * shorter[1] / np.where(exists, area, 1.0), 2.0)
+    blur = np.minimum(4 * epsilon * shorter[0] * shorter[1] / np.where(exists, area, 1.0), 2.0)
     blur = np.where(exists, blur, np.where(shorter[0] > 0, 2.0, 0.0))
 
     # The arc's plane, and in it the direction nearest to the axis.
@@ -212,7 +264,7 @@ def _over_contour(
     p = n + 2 if double else n + 1
     top = np.clip(0, first, last)
     highest = np.where(exists, c * np.maximum(np.cos(top), 0), 0.0)
-    core = np.arccos(np.maximum(np.cos(top), 0) * np.exp(-GONE / max(n, 1)))
+    core = np.arccos(np.maximum(np.cos(top), 0) * np.exp(-gone / max(n, 1)))
     low, high = np.clip(-core, first, last), np.clip(core, first, last)
 
     def around(one: Floats, other: Floats) -> Floats:
@@ -225,23 +277,23 @@ def _over_contour(
     peak = highest.max(axis=1)
     whole = peak ** float(p) > _TAIL
     half = (high - low)[..., None] / 2
-    s = low[..., None] + half * (1 + _EDGE_NODES)
+    s = low[..., None] + half * (1 + nodes)
     ratio, logarithm = potential(b[..., None], c[..., None], s, p, whole[:, None, None])
-    weights = half * _EDGE_WEIGHTS
-    gamma = dot(axes, normals)[:, None] if double else np.ones((len(axes), 1))
+    weights = half * along_edge
+    gamma = dot(axes, normals)[:, None] if double else np.ones((len(axes), 1), dtype=height.dtype)
     turning = (weights * ratio).sum(axis=-1)
     inside = np.where(whole[:, None], around(first, low) + around(high, last), 0.0)
-    winding = np.round(around(first, last).sum(axis=1) / (2 * np.pi))
-    enclosed = np.where(whole, 0.0, 2 * np.pi * winding)
+    winding = np.round(around(first, last).sum(axis=1) / (2 * pi))
+    enclosed = np.where(whole, 0.0, 2 * pi * winding)
     total = (gamma * (b * turning + inside)).sum(axis=1) / p + gamma[:, 0] * enclosed / p
 
     power = np.exp(n * logarithm)
     sideways = np.sqrt(np.clip(1 - np.exp(2 * logarithm), 0, 1))
     # Rounding: of what is added up, of the arcs' planes, of directions by which powers change.
     magnitude = np.abs(gamma) * (np.abs(b * turning) + np.abs(inside)) / p
-    error = 16 * _EPSILON * (magnitude.sum(axis=1) + np.abs(gamma[:, 0] * enclosed) / p)
+    error = 16 * epsilon * (magnitude.sum(axis=1) + np.abs(gamma[:, 0] * enclosed) / p)
     error += (blur * np.abs(gamma) * (np.abs(turning) + np.where(whole[:, None], arc, 0.0)) / p).sum(axis=1)
-    error += 8 * _EPSILON * (weights * power * (1 + n * sideways * np.abs(b[..., None]))).sum(axis=(1, 2))
+    error += 8 * epsilon * (weights * power * (1 + n * sideways * np.abs(b[..., None]))).sum(axis=(1, 2))
     if double:
         q = np.cross(axes, normals)[:, None]
         q1, q2 = dot(e1, np.broadcast_to(q, e1.shape)), dot(e2, np.broadcast_to(q, e2.shape))
@@ -249,7 +301,7 @@ def _over_contour(
         climb = -c[..., None] * np.sin(s) * power
         total += (weights * climb * tilt).sum(axis=(1, 2))
         turned = n * sideways * np.exp(max(n - 1, 0) * logarithm) * np.abs(c[..., None] * np.sin(s))
-        error += 8 * _EPSILON * (weights * (2 * np.abs(climb) + turned) * np.abs(tilt)).sum(axis=(1, 2))
+        error += 8 * epsilon * (weights * (2 * np.abs(climb) + turned) * np.abs(tilt)).sum(axis=(1, 2))
         steep = np.abs(climb) + power * np.abs(tilt)
         error += (blur * (weights * steep).sum(axis=-1)).sum(axis=1)
     error += _misplaced(seen, seen.doubt + seen.rounding, peak ** float(n))
