@@ -25,7 +25,7 @@ import numpy as np
 
 from oracle.emitters import Area, Receivers
 from oracle.irradiances import irradiance
-from oracle.shapes import Polygon, Rectangle
+from oracle.shapes import Polygon, Rectangle, Shape
 
 TARGET_RATE = 2e6
 TARGET_MEMORY = 1.0
@@ -40,7 +40,11 @@ def lights() -> dict[str, Area]:
     angles = -np.pi / 7 * np.arange(14)
     radii = np.where(np.arange(14) % 2, 0.25, 0.6)
     star = Polygon(CENTER + np.column_stack([radii * np.cos(angles), radii * np.sin(angles), np.zeros(14)]))
-    shapes = {"quad": quad, "triangle": Polygon(quad.polygon.vertices[:3]), "star with 14 vertices": star}
+    shapes: dict[str, Shape] = {
+        "quad": quad,
+        "triangle": Polygon(quad.polygon.vertices[:3]),
+        "star with 14 vertices": star,
+    }
     return {name: Area(shape, np.ones(1)) for name, shape in shapes.items()}
 
 
