@@ -339,15 +339,6 @@ bool begin_at_meter(const Scene& scene, const Method& method, const Sensor& sens
 
 }  // namespace
 
-Ray sensor_ray(const Sensor& sensor, const Vec2& f) {
-    switch (sensor.kind) {
-        case Sensor::Kind::perspective:
-            return {sensor.origin, normalize(sensor.forward + (f.x - 0.5f) * sensor.right + (f.y - 0.5f) * sensor.down)};
-        case Sensor::Kind::orthographic: return {sensor.point({f.x - 0.5f, f.y - 0.5f}), sensor.forward};
-        default: return {sensor.origin, sensor.forward};
-    }
-}
-
 void measure(const Scene& scene, const Sensor& sensor, const Film& film, const Method& method, int x, int y,
              const Sampler& sampler, int count, Color* results) {
     Path paths[batch];

@@ -38,6 +38,13 @@ void measure(const Scene& scene, const Sensor& sensor, const Film& film, const M
              const Sampler& sampler, int count, Color* results);
 
 // The ray through a point of the film; not for an irradiance meter.
-Ray sensor_ray(const Sensor& sensor, const Vec2& film_position);
+inline Ray sensor_ray(const Sensor& sensor, const Vec2& f) {
+    switch (sensor.kind) {
+        case Sensor::Kind::perspective:
+            return {sensor.origin, normalize(sensor.forward + (f.x - 0.5f) * sensor.right + (f.y - 0.5f) * sensor.down)};
+        case Sensor::Kind::orthographic: return {sensor.point({f.x - 0.5f, f.y - 0.5f}), sensor.forward};
+        default: return {sensor.origin, sensor.forward};
+    }
+}
 
 }  // namespace oracle

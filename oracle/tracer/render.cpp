@@ -14,22 +14,14 @@ constexpr int tile = 16;
 // Larger than this a sample, in units of 2^exponent, is not added: its square would leave the range.
 constexpr double largest_sample = 0x1p28;
 
-// Adds a value in [0, 2^60) times 2^`shift`, rounded down to an integer; `shift` is between 0 and 64.
-void add(Sum& sum, double value, int shift) {
-    // A double is 53 bits and where they belong.
-    uint64_t bits;
-    std::memcpy(&bits, &value, sizeof bits);
-    const uint64_t digits = (bits & 0xfffffffffffffull) | 0x10000000000000ull;
-    const int left = int(bits >> 52) - 1075 + shift;
-    uint64_t low = 0, high = 0;
-    if (left >= 64)
-        high = digits << (left - 64);
-    else if (left > 0)
-        low = digits << left, high = digits >> (64 - left);
-    else if (left > -64)
-        low = digits >> -left;
+// Adds a value in [0, 2^60) times 2^`shift`, rounded down to an integer; `shift` is between 1 and 64.
+inline void add(Sum& sum, double value, int shift) {
+    // A double is the sum of its whole part and the rest, exactly.
+    const auto whole = static_cast<int64_t>(value);
+    const auto rest = static_cast<uint64_t>((value - static_cast<double>(whole)) * (shift == 64 ? 0x1p64 : static_cast<double>(uint64_t{1} << shift)));
+    const uint64_t low = shift == 64 ? rest : rest | static_cast<uint64_t>(whole) << shift;
     sum.low += low;
-    sum.high += static_cast<int64_t>(high + (sum.low < low));
+    sum.high += (shift == 64 ? whole : whole >> (64 - shift)) + (sum.low < low);
 }
 
 Defect::Kind defect_of(const Color& c, double scale) {

@@ -82,13 +82,12 @@ struct UserGeometry {
         set_bounds(args->bounds_o, g.center, extent);
     }
 
-    // The nearest distance between those of the ray, or infinity.
-    static float distance(const Geometry& g, const RTCRay& ray) {
-        const double ox = double(ray.org_x) - g.center.x, oy = double(ray.org_y) - g.center.y,
-                     oz = double(ray.org_z) - g.center.z;
-        const double dx = ray.dir_x, dy = ray.dir_y, dz = ray.dir_z;
+    // The nearest distance above 0 and below `limit`, or infinity.
+    static float distance(const Geometry& g, const Vec3& origin, const Vec3& direction, float limit) {
+        const double ox = double(origin.x) - g.center.x, oy = double(origin.y) - g.center.y, oz = double(origin.z) - g.center.z;
+        const double dx = direction.x, dy = direction.y, dz = direction.z;
         const double r2 = double(g.radius) * g.radius;
-        const auto inside = [&](double t) { return t > ray.tnear && t < ray.tfar; };
+        const auto inside = [&](double t) { return t > 0 && t < limit; };
         if (g.kind == Scene::Kind::disk) {
             const double facing = dx * g.normal.x + dy * g.normal.y + dz * g.normal.z;
             if (facing == 0) return infinity;
@@ -97,14 +96,18 @@ struct UserGeometry {
             return inside(t) && x * x + y * y + z * z <= r2 ? float(t) : infinity;
         }
         // From the point of the ray that is nearest to the center, half a chord back or forth.
-        const double d2 = dx * dx + dy * dy + dz * dz;
-        const double middle = -(ox * dx + oy * dy + oz * dz) / d2;
+        const double per_length2 = 1 / (dx * dx + dy * dy + dz * dz);
+        const double middle = -(ox * dx + oy * dy + oz * dz) * per_length2;
         const double x = ox + middle * dx, y = oy + middle * dy, z = oz + middle * dz;
-        const double h2 = (r2 - (x * x + y * y + z * z)) / d2;
+        const double h2 = (r2 - (x * x + y * y + z * z)) * per_length2;
         if (h2 < 0) return infinity;
         const double half = std::sqrt(h2);
         if (inside(middle - half)) return float(middle - half);
         return inside(middle + half) ? float(middle + half) : infinity;
+    }
+
+    static float distance(const Geometry& g, const RTCRay& ray) {
+        return distance(g, {ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, ray.tfar);
     }
 
     static void intersect(const RTCIntersectFunctionNArguments* args) {
@@ -393,7 +396,7 @@ bool Scene::complete(const Ray& ray, const Few::Hit& found, Hit& hit) const {
     }
     bool any = found.index != Few::none;
     for (const uint32_t i : round_) {
-        const float t = UserGeometry::distance(geometries_[i], make_ray(ray.origin, ray.direction, hit.distance));
+        const float t = UserGeometry::distance(geometries_[i], ray.origin, ray.direction, hit.distance);
         if (!(t < hit.distance)) continue;
         hit.distance = t, hit.geometry = i, hit.primitive = 0, hit.few = Few::none;
         any = true;
@@ -403,7 +406,7 @@ bool Scene::complete(const Ray& ray, const Few::Hit& found, Hit& hit) const {
 
 bool Scene::is_blocked_by_round(const Connection& c) const {
     return std::any_of(round_.begin(), round_.end(), [&](uint32_t i) {
-        return UserGeometry::distance(geometries_[i], make_ray(c.from, c.direction, c.distance)) < c.distance;
+        return UserGeometry::distance(geometries_[i], c.from, c.direction, c.distance) < c.distance;
     });
 }
 
