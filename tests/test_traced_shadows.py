@@ -121,6 +121,47 @@ def test_hard_shadows_are_where_they_belong(body, emitter):
         assert_right(measured, expected, known_to=1e-3)
 
 
+LIGHTS = {
+    "a rectangle": LAMP,
+    "a triangle": Area(Mesh([[0, 0, 1.5], [0, 1, 1.4], [1, 0, 1.6]], [[0, 1, 2]]), LIGHT),
+    "a disk": Area(Disk([0.3, 0.2, 1.5], [0, 0, -1], 0.5), LIGHT),
+    "a sphere": Area(Sphere([0.3, 0.2, 1.5], 0.5), LIGHT),
+    "a point": Point([0.3, 0.2, 1.5], LIGHT),
+}
+
+
+def lids(emitter, gap):
+    """What covers an emitter as seen from the floor, at this distance before it, or behind it if that is negative."""
+    if isinstance(emitter, Point):
+        return [Object(Rectangle(emitter.position - [0, 0, gap], [3, 0, 0], [0, 3, 0]))]
+    if isinstance(emitter.shape, Sphere):
+        return [Object(Sphere(emitter.shape.center, emitter.shape.radius + gap))]
+    lamp = emitter.shape
+    if isinstance(lamp, Mesh):
+        a, b, c = lamp.vertices
+        normal = unit(np.cross(b - a, c - a))
+        return [Object(Mesh(lamp.vertices * 1.5 - lamp.vertices.mean(axis=0) * 0.5 + gap * normal, lamp.triangles))]
+    if isinstance(lamp, Disk):
+        return [Object(Disk(lamp.center + gap * lamp.normal, lamp.normal, 1.5 * lamp.radius))]
+    return [Object(Rectangle(lamp.center + gap * lamp.normal, 1.5 * lamp.half_u, 1.5 * lamp.half_v))]
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+@pytest.mark.parametrize("floor", ["a meter", "a surface"])
+@SURFACES
+def test_a_body_next_to_a_light_hides_it_from_the_front_only(name, floor, crowd):
+    emitter, ground = LIGHTS[name], Object(FLOOR, Diffuse([0.8] * 3))
+    expected = irradiances([emitter], FLOOR, FILM)
+    for gap in (1e-4, -1e-4):
+        scene = scene_of([emitter], *lids(emitter, gap), *([ground] if floor == "a surface" else []), *crowd)
+        sensor = looking_down(FLOOR) if floor == "a surface" else IrradianceMeter(FLOOR)
+        shown = render(scene, sensor, FILM, spp=1 << 10, bounces=int(floor == "a surface"))
+        if gap > 0:
+            assert (shown.mean == 0).all()
+        else:
+            assert_right(shown, expected * (0.8 / np.pi if floor == "a surface" else 1), known_to=2e-2)
+
+
 # --------------------------------------------------------------------------------------------------------- leaks
 
 
