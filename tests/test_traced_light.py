@@ -122,6 +122,13 @@ def test_behind_a_lamp_that_shines_on_one_side_it_is_dark(shape, strategy):
     assert (render(scene, IrradianceMeter(FLOOR), FILM, spp=256, strategy=strategy, bounces=0).mean == 0).all()
 
 
+@pytest.mark.parametrize("strategy", ["light", "mis"])
+def test_a_lit_surface_is_black_from_behind(strategy):
+    scene = scene_of(LAMPS["a near rectangle"], Object(FLOOR, Diffuse([0.8] * 3)))
+    below = looking_down(Rectangle(FLOOR.center, FLOOR.half_v, FLOOR.half_u))
+    assert (render(scene, below, FILM, spp=256, strategy=strategy).mean == 0).all()
+
+
 def test_a_lamp_hides_the_environment_behind_it():
     around, lamps = 0.1 * LIGHT, LAMPS["a disk"]
     more = Area(lamps[0].shape, LIGHT - around)
