@@ -57,7 +57,7 @@ calibrate: setup ## false alarms and power of the judge, by simulation; minutes
 	@PYTHONPATH=tests .venv/bin/python tests/calibration.py 1000
 
 COUNT ?= 20000
-verify: setup ## every closed form against ball arithmetic in 20,000 configurations; half a day (COUNT=500: minutes)
+verify: setup ## every closed form against ball arithmetic in 20,000 configurations; four hours (COUNT=500: minutes)
 	@PYTHONPATH=tests .venv/bin/python tests/verification.py $(COUNT)
 
 second-opinion: setup ## render with Mitsuba what the tracer is compared with; most of an hour
