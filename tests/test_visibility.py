@@ -51,6 +51,21 @@ def test_without_occluders_the_whole_emitter_is_seen():
     assert_same(seen([]), projected_solid_angle(LIGHT, on_the_floor()), 0)
 
 
+def test_bounds_hold_where_a_needle_s_own_normal_does_not_tell_the_side():
+    needle = Polygon(
+        [
+            [0.9903945457354207, 0.13827018397879376, 0.0],
+            [-0.9903945457354207, -0.13827018397879376, 0.0],
+            [-0.8313674633608771, -0.11606823647622681, 2.7719696032510957e-07],
+        ]
+    )
+    point = [-0.9659445634491785, -0.12915754053451892, -0.09642455089642986]
+    normal = [0.8137347730452955, 0.07957613732039012, 0.5757632825268453]
+    found = seen([], Receivers(point, normal), needle)
+    # The contour integral in 60 digits.
+    assert abs(found.value - 8.38195653158964e-18) <= found.error
+
+
 def test_what_a_screen_hides_is_its_shadow_on_the_emitter():
     # The screen is halfway: seen from p it hides the part of the emitter's plane at 2 s - p.
     for point in np.random.default_rng(2).uniform(-0.2, 0.2, (20, 3)) * [1, 1, 0]:

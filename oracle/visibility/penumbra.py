@@ -103,7 +103,10 @@ class _Scene:
         value, error = np.zeros(points.shape[1]), np.zeros(points.shape[1])
         away = points - self.light.vertices[0][:, None]
         height = self.normal @ away
-        noise = TOUCH * (np.abs(self.normal) @ np.abs(away) + np.abs(away).max(axis=0))
+        # The normal of a needle is rounded more than others.
+        extent = np.abs(self.light.vertices - self.light.vertices[0]).max()
+        blur = 1 + extent**2 / self.light.area
+        noise = TOUCH * (np.abs(self.normal) @ np.abs(away) + blur * np.abs(away).max(axis=0))
         front = height > 0
         if front.any():
             seen = self._seen_in_front(points[:, front], normals[:, front])
