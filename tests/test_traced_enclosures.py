@@ -52,7 +52,9 @@ def test_two_plates_that_see_nothing_but_each_other(bounces, alone):
         assert_shows(scene_of([], *plates), [0.3, 0.2, 0.4], direction, radiance, **options)
 
 
-@pytest.mark.parametrize("bounces", [1, 2, 4, None])
+@pytest.mark.parametrize(
+    ("bounces", "alone"), [(1, False), (2, False), (4, False), (None, False), (2, True), (3, True)]
+)
 @pytest.mark.parametrize(
     "source",
     [
@@ -62,7 +64,7 @@ def test_two_plates_that_see_nothing_but_each_other(bounces, alone):
     ],
     ids=["a point", "a small sphere", "a small disk"],
 )
-def test_an_integrating_sphere_with_a_source_off_its_centre(source, bounces):
+def test_an_integrating_sphere_with_a_source_off_its_centre(source, bounces, alone):
     # The sources hide a millionth of the wall.
     sphere, rho = Sphere([0, 0, 0], 1.0), np.array([0.5, 0.7, 0.9])
     scene = scene_of([source], Object(sphere, TwoSided(Diffuse(rho))))
@@ -70,6 +72,8 @@ def test_an_integrating_sphere_with_a_source_off_its_centre(source, bounces):
         # One reflection more than at the wall point itself.
         reflected = None if bounces is None else bounces - 1
         irradiance = integrating_sphere(sphere, source, towards, rho, reflected).value
+        if alone:
+            irradiance = irradiance - integrating_sphere(sphere, source, towards, rho, reflected - 1).value
         origin = np.array([0.1, 0.4, -0.2])
-        meter = {"bounces": bounces, "known_to": 0.01, "spp": 128}
+        meter = {"bounces": bounces, "first_bounce": bounces if alone else 0, "known_to": 0.01, "spp": 128}
         assert_shows(scene, origin, towards - origin, rho / np.pi * irradiance, **meter)

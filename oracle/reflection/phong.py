@@ -53,9 +53,9 @@ def axial_moment(shape: Polygon | Rectangle, receivers: Receivers, axes: ArrayLi
     ``z = c cos(s)``, on which ``dphi = b ds / (1 - z^2)``. Arvo's recurrence is the expansion of that quotient; here it
     is integrated by a Gauss rule over the part of the arc where the power matters, and in closed form beyond, which
     costs the same for all exponents. Small polygons are integrated over their area.
-    Where edges nearly cancel, as those of needles and of slivers above a horizon, or pass the receiver at a millionth of
-    their length, float64 loses digits: there it is computed once more in `numpy.longdouble`, if that is longer. What is
-    lost then (1e-10 or more of some slivers seen from 1e-6 beside the polygon's plane), the bound says.
+    Where edges nearly cancel, as those of needles and of slivers above a horizon, or pass the receiver at a millionth
+    of their length, float64 loses digits: there it is computed once more in `numpy.longdouble`, if that is longer. What
+    is lost then (1e-10 or more of some slivers seen from 1e-6 beside the polygon's plane), the bound says.
     """
     return _moment(shape, receivers, axes, exponent, double=False)
 
