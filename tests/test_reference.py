@@ -281,7 +281,7 @@ def test_rendering_ends_when_the_error_is_reached(oracle, scene, share):
 
 def test_no_error_is_reached_where_no_light_is(oracle, tmp_path):
     dark = write(tmp_path / "dark.json", small_scene(emitters=()))
-    message = "dark.json: no light reached a pixel in 16 samples, so that --error says nothing; look at the scene, or"
+    message = "dark.json: no light reached a pixel in 32 samples, so that --error says nothing; look at the scene, or"
     refused(oracle(dark, "--error", "1%", "-o", "out"), message)
     assert set(content("out")) == FILES
     assert oracle(dark, "--error", "1%", "--spp", 8, "-o", "both")[0] == 0
@@ -919,16 +919,16 @@ def test_an_interrupted_cache_goes_on_with_the_same_command(cache, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(tracer_rendering.Job, "extended", stops)
-        code, out, err = cache("--spp", 32)
+        code, out, err = cache("--spp", 64)
     assert code == 130
-    assert "16 samples per pixel are kept in cache/sphere-0-" in err
+    assert "32 samples per pixel are kept in cache/sphere-0-" in err
     assert err.endswith("; the same command goes on from there\n")
     assert "disk-0-" in out
-    assert cache("--spp", 32)[0] == 0
+    assert cache("--spp", 64)[0] == 0
     (sphere,) = Path("cache").glob("sphere-*")
-    assert read_about(sphere).spp == 32
+    assert read_about(sphere).spp == 64
     np.testing.assert_array_equal(
-        read_state(sphere)[1].sums, render(*to_tracer(FAMILIES["sphere"].member(0)), spp=32).sums
+        read_state(sphere)[1].sums, render(*to_tracer(FAMILIES["sphere"].member(0)), spp=64).sums
     )
 
 
@@ -973,7 +973,7 @@ def test_without_a_terminal_there_are_plain_lines_from_time_to_time(oracle, scen
     _, _, err = oracle(scene, "--spp", 64, "-o", "out")
     pattern = r"scene\.json: (\d+) samples per pixel, standard error [\d.]+ %, \d+ s, \d+ s left"
     lines = [re.fullmatch(pattern, line) for line in err.splitlines()]
-    assert [int(line[1]) for line in lines] == [16, 32, 64]
+    assert [int(line[1]) for line in lines] == [32, 64]
     monkeypatch.setattr(reference_progress, "LINE_SECONDS", 1e9)
     assert oracle(scene, "--spp", 64, "-o", "again")[2] == ""
 

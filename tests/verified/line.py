@@ -46,8 +46,8 @@ def exact_along(start, end, point, n, clipped):
     h = norm(foot)
     if all(x == 0 for x in foot) or not h > 0:
         return 0.0 if first > 0 or last < 0 else None
-    if first <= 0 <= last and not h > 1e-24 * length:
-        # Twice the digits of float64 put it on the line, where nothing is computed.
+    if first <= 1e-15 * length and last >= -1e-15 * length and not h > 1e-24 * length:
+        # Twice the digits of float64 put it on the line, ends included, where nothing is computed.
         return None
     up, flat = dot(n, foot), dot(n, t)
     if clipped:
