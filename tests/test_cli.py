@@ -453,10 +453,12 @@ def test_an_interrupted_grading_leaves_nothing_behind(tmp_path, submit, submit_c
             '[render]\ncommand = ["x", "{scene}", "{output}"]\noutput = "exr"\n'
         )
     (tmp_path / "tmp").mkdir()
+    # Jobs in the background hand down that they ignore interruptions.
+    heed = {"preexec_fn": lambda: signal.signal(wish, signal.SIG_DFL)}
     with subprocess.Popen(
         [ORACLE, "grade", folder, "--rubric", rubric(timeout=60), "--out", "out", "--jobs", "1"],
         cwd=tmp_path, env=environment(TMPDIR=str(tmp_path / "tmp")), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True,
+        text=True, **heed,
     ) as process:  # fmt: skip
         pids = folder / "pids"
         deadline = time.monotonic() + 30
