@@ -171,7 +171,7 @@ void DiffuseVertices::connect(const Scene& scene) {
         const bool shines = (d > 0) & (!has_sides | (facing > 0) | ((facing < 0) & (emitters.two_sided[i] != 0)));
         const float density = probability_[i] * (by_area ? d2 / (std::fabs(facing) * emitters.area[i]) : samples.pdf[i]);
         // The density of what was chosen by area varies: unless it is far away, reflection finds a share of its light.
-        const bool is_near = (kind == disk) & !(emitters.area[i] < length_squared(emitters.p[i] - p));
+        const bool is_near = (kind == disk) & !is_far(emitters.area[i], length_squared(emitters.p[i] - p));
         const bool shared = is_near | ((kind == sphere) & by_area);
         const bool reflects = (cosine > 0) & (dot(shading_[i], to_eye_[i]) > 0);
         const float weight = cosine * inv_pi / (density + (shared ? cosine * inv_pi : 0));

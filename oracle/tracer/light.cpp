@@ -84,7 +84,7 @@ bool is_sampled_evenly(const Light& l, const Vec3& from) {
         case Kind::triangle: return true;
         case Kind::sphere: return is_outside(length_squared(l.p - from), l.radius);
         // Sampled by area, whose density per solid angle rises slowly as long as the disk is no nearer than wide.
-        default: return l.area < length_squared(l.p - from);
+        default: return is_far(l.area, length_squared(l.p - from));
     }
 }
 

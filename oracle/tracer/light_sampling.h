@@ -167,6 +167,9 @@ inline EmitterSample sample_sphere(const Vec3& center, float radius, const Vec3&
     return {center + radius * n, n, outside ? 1 / (2 * pi * part) : 0};
 }
 
+// Whether a disk is so far away that sampling its area samples about evenly what is seen of it.
+inline bool is_far(float area, float distance_squared) { return area < distance_squared; }
+
 // What a spot sends where the angle to its axis has this cosine and sine.
 inline float spot_falloff(float full, float cutoff, float sine, float cosine) {
     const float part = (cutoff - arc_tangent(sine, cosine)) / (cutoff - full);

@@ -228,7 +228,7 @@ float Bsdf::pdf_other(const Vec3& eye, const Vec3& light) const {
 BsdfSample Bsdf::sample_other(const Vec3& eye, const Vec2& u, float choice) const {
     switch (material.kind) {
         case Kind::diffuse: {
-                    if (eye.z <= 0) return {};
+            if (eye.z <= 0) return {};
             const Vec3 light = square_to_cosine_hemisphere(u);
             return {light, material.reflectance.at(textures, uv), light.z * inv_pi};
         }

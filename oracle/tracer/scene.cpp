@@ -514,7 +514,6 @@ void Scene::describe(const Ray& ray, const Hit& hit, Surface& s) const {
     }
 }
 
-
 void Scene::blocked(const Connection* connections, int count, bool together, bool* result) const {
     if (is_small_) {
         int chosen[Few::side_by_side], waiting = 0;
