@@ -220,13 +220,14 @@ def scattered_directional(emitter: Directional, rays: Rays, medium: Medium, boun
     [Chandrasekhar 1960, single scattering in a plane-parallel atmosphere].
     """
     _demand_channels(emitter.irradiance, medium)
-    steepness = -float(emitter.direction @ boundary.normal)
+    normal = boundary.normal
+    steepness = -float(emitter.direction @ normal)
     if steepness <= 0:
         raise InvalidArgument("direction of the light does not point into the half-space")
-    near = dot(boundary.point - rays.origins, np.broadcast_to(boundary.normal, rays.origins.shape))
-    slope = dot(rays.directions, np.broadcast_to(boundary.normal, rays.origins.shape))
+    offsets = boundary.point - rays.origins
+    near, slope = offsets @ normal, rays.directions @ normal
     far = near - slope * rays.lengths
-    scale = np.abs(boundary.point - rays.origins).max(axis=-1) + rays.lengths
+    scale = np.abs(offsets).max(axis=-1) + rays.lengths
     outside = np.minimum(near, far) < -8 * _EPSILON * scale
     if outside.any():
         where = [int(i) for i in np.argwhere(outside)[0]]
@@ -242,11 +243,22 @@ def scattered_directional(emitter: Directional, rays: Rays, medium: Medium, boun
     # 1 - cos(angle) from the difference of the directions, the light's and that towards the origin.
     cosines = _one_minus(-rays.directions, emitter.direction, medium.asymmetry)
     phase = _henyey_greenstein(cosines, np.float64(medium.asymmetry))
-    value = medium.scattering * emitter.irradiance * (phase * rays.lengths)[..., None] * mean * np.exp(-start)
-    # Heights are rounded by some ulp of the coordinates, and the light's way by as much over its steepness.
-    doubt = 8 * _EPSILON * (scale / steepness**2)[..., None] * sigma
+    most = medium.scattering * emitter.irradiance * (phase * rays.lengths)[..., None]
+    value = most * mean * np.exp(-start)
+
+    # Rounding of the products with the normal, each by some ulp of its terms, and what follows for the exponents.
+    each = np.abs(normal)
+    lost = 8 * _EPSILON * float(np.abs(emitter.direction) @ each) / steepness
+    lost_slope = 8 * _EPSILON * (np.abs(rays.directions) @ each)
+    lost_near = 8 * _EPSILON * (np.abs(offsets) @ each)
+    lost_far = lost_near + lost_slope * rays.lengths
+    way_off = (np.maximum(lost_near, lost_far) + np.maximum(near, far) * lost) / steepness
+    growth_off = (lost_slope + np.abs(slope) * lost) / steepness * rays.lengths
+    doubt = sigma * way_off[..., None] + sigma * growth_off[..., None] / np.maximum(2.0, rise)
     peak = 3 * abs(medium.asymmetry) / (1 - abs(medium.asymmetry))
-    return Bounded(value, value * (_EPSILON * (24 + 4 * peak + 4 * start) + doubt))
+    error = value * (_EPSILON * (24 + 4 * peak + 4 * start) + np.expm1(np.minimum(doubt, 1.0)))
+    # Light that grazes the boundary so closely that its way is not known may come without loss, or not at all.
+    return Bounded(value, np.where(doubt < 1, error + np.finfo(np.float64).tiny * (start > 600), most))
 
 
 def scattered_point(emitter: Point, rays: Rays, medium: Medium) -> Bounded:

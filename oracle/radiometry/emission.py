@@ -119,10 +119,13 @@ def intensity(emitter: Emitter, directions: ArrayLike) -> Bounded:
             return _with_channels(Bounded(ones, 0 * ones), emitter.intensity)
         case Spot():
             span = emitter.cutoff_angle - emitter.beam_width
-            linear = (emitter.cutoff_angle - angle_between(towards, emitter.direction)) / span
+            angle = angle_between(towards, emitter.direction)
+            linear = (emitter.cutoff_angle - angle) / span
             falloff = np.clip(linear, 0, 1)
-            # The angle's error, a few ulp of pi, counts only where the intensity falls.
-            rounding = 16 * _EPSILON / span
+            # The angle's error is some ulp of itself and of its sine's terms; it counts only where the intensity falls.
+            first, second = np.abs(towards), np.abs(emitter.direction)
+            terms = np.roll(first, 1, -1) * np.roll(second, -1) + np.roll(first, -1, -1) * np.roll(second, 1)
+            rounding = 8 * _EPSILON * (angle + emitter.cutoff_angle + np.linalg.norm(terms, axis=-1)) / span
             falls = np.abs(linear - 0.5) <= 0.5 + rounding
             error = np.where(falls, rounding, 0.0) + 4 * _EPSILON * falloff
             return _with_channels(Bounded(falloff, error), emitter.intensity)
@@ -263,9 +266,11 @@ def _projected_area(shape: Shape, towards: Floats, two_sided: bool) -> Bounded:
         case Polygon() | Rectangle() | Disk():
             oriented = _vector_area(shape) if isinstance(shape, Polygon) else shape.area * shape.normal
             shown = towards @ oriented
-            rounding = 16 * _EPSILON * float(np.linalg.norm(oriented))
+            # Of a polygon each component is exact, of the others the whole vector.
+            size = np.abs(oriented) if isinstance(shape, Polygon) else np.full(3, np.linalg.norm(oriented))
+            rounding = 16 * _EPSILON * (np.abs(towards) @ size)
             if two_sided:
-                return Bounded(np.abs(shown), np.full_like(shown, rounding))
+                return Bounded(np.abs(shown), rounding)
             return Bounded(np.maximum(shown, 0), np.where(shown > -rounding, rounding, 0.0))
 
 
