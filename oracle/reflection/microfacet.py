@@ -206,6 +206,7 @@ def density(distribution: Distribution, m: Floats, m_error: Floats, alphas: tupl
     tilt = x**2 + y**2
     tilt_error = 2 * (np.abs(x) * m_error[..., 0] / a_x + np.abs(y) * m_error[..., 1] / a_y) + 6 * _EPSILON * tilt
     doubt = 4 * dot(np.abs(m), m_error) / length_squared + 20 * _EPSILON
+    least = np.full_like(scale, np.finfo(np.float64).tiny)
     match distribution:
         case GGX():
             total = z**2 + tilt
@@ -218,7 +219,10 @@ def density(distribution: Distribution, m: Floats, m_error: Floats, alphas: tupl
             value = np.where(exponent < 700, scale * np.exp(-kept) / np.where(exponent < 700, z, 1.0) ** 4, 0.0)
             shift = tilt_error / z**2 + 2 * kept * m_error[..., 2] / z
             doubt = doubt + np.expm1(np.minimum(shift, 100.0)) + 4 * m_error[..., 2] / z
-    return Bounded(np.where(up, value, 0.0), np.where(up, value * doubt + np.finfo(np.float64).tiny, 0.0))
+            # There D = scale e^2 exp(-e) / tilt^2 is below what it would be at an exponent e of 698.
+            beyond = exponent >= 700
+            least = np.where(beyond, scale * 4e-298 / np.where(beyond, tilt, 1.0) ** 2 + least, least)
+    return Bounded(np.where(up, value, 0.0), np.where(up, value * doubt + least, 0.0))
 
 
 def local(distribution: Distribution, directions: ArrayLike) -> tuple[Floats, tuple[Floats, Floats]]:
