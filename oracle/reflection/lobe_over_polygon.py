@@ -44,6 +44,8 @@ class _Seen:
     """By how much clipping may have moved a vertex along its edge [m], where that tells, shape (N, K)."""
     rounding: Floats
     """By how much clipping may have moved it across [m], shape (N, K)."""
+    missed: Floats
+    """Solid angle that may be left where clipping has found nothing [sr], shape (N,)."""
 
     def clipped(self, normals: Floats, doubtful: bool) -> _Seen:
         """The part above the horizon of `normals` (N, 3), after Sutherland and Hodgman [1974]."""
@@ -66,6 +68,12 @@ class _Seen:
         rounding = 4 * float(np.finfo(reach.dtype).eps) * reach
         doubt = rounding * np.minimum(along / np.abs(fall), 1e6) if doubtful else np.zeros_like(reach)
 
+        # A corner that sticks out by less than rounding is within so much of the horizon.
+        nearest = np.maximum(np.sqrt(dot(self.offsets, self.offsets).min(axis=1)), np.finfo(np.float64).tiny)
+        highest, turn = heights.max(axis=1), np.minimum(rounding.max(axis=1) / nearest, np.pi)
+        strip = turn * (np.minimum(along.sum(axis=1) / nearest, 2 * np.pi) + turn)
+        empty = (highest <= 0) & (highest > -rounding.max(axis=1))
+
         # Each vertex is followed by the crossing of its edge; those that exist come first, the last one is repeated.
         exists = np.stack([inside, crossing], axis=2).reshape(n, 2 * count)
         order = np.argsort(~exists, axis=1, kind="stable")
@@ -83,6 +91,7 @@ class _Seen:
             choose(self.relative, begin + step_vector),
             choose(self.doubt, doubt),
             choose(self.rounding, rounding),
+            self.missed + np.where(empty, strip, 0),
         )
 
 
@@ -114,7 +123,7 @@ def _moment(
     doubt = epsilon * (4 + 4 * size**2 / polygon.area) * np.sqrt(dot(offsets[:, 0], offsets[:, 0]))
 
     exact = np.zeros(offsets.shape[:2], dtype=kind)
-    seen = _Seen(offsets, np.broadcast_to(relative, offsets.shape), exact, exact)
+    seen = _Seen(offsets, np.broadcast_to(relative, offsets.shape), exact, exact, exact[:, 0])
     # On the clipped horizon the double-axis integrand is 0, and on the lobe's any power is: errors there do not tell.
     seen = seen.clipped(normals, doubtful=not double).clipped(axes, doubtful=n == 0)
 
@@ -130,12 +139,12 @@ def _moment(
     value, error = np.zeros(len(points), dtype=kind), np.zeros(len(points), dtype=kind)
     for here, method in ((small, _over_area), (~small, _over_contour)):
         if here.any():
-            what = _Seen(seen.offsets[here], seen.relative[here], seen.doubt[here], seen.rounding[here])
+            what = _Seen(*(a[here] for a in (seen.offsets, seen.relative, seen.doubt, seen.rounding, seen.missed)))
             found = method(what, front, height[here], doubt[here], normals[here], axes[here], n, double)
             value[here], error[here] = found.value, found.error
     value = np.maximum(value, 0)
     # So near to the plane that the side is uncertain, all may be wrong.
-    error = error + np.where(np.abs(height) <= doubt, value, 0)
+    error = error + np.where(np.abs(height) <= doubt, value, 0) + seen.missed
     return Bounded(np.where(height > 0, value, 0), np.where(height > -doubt, error, 0))
 
 
