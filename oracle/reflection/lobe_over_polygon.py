@@ -253,7 +253,11 @@ def _over_contour(
     area = np.sqrt(dot(cross, cross))
     exists = area > 0
     shorter = np.sort(lengths, axis=0)
-    blur = np.minimum(4 * epsilon * shorter[0] * shorter[1] / np.where(exists, area, 1.0), 2.0)
+    blur = 4 * epsilon * shorter[0] * shorter[1] / np.where(exists, area, 1.0)
+    # A cut vertex that is off turns the plane, the more so if the other end is nearly opposite.
+    off = seen.doubt + seen.rounding
+    blur += (off * lengths[1] + np.roll(off, -1, axis=1) * lengths[0]) / np.where(exists, area, 1.0)
+    blur = np.minimum(blur, 2.0)
     blur = np.where(exists, blur, np.where(shorter[0] > 0, 2.0, 0.0))
 
     # The arc's plane, and in it the direction nearest to the axis.
