@@ -45,7 +45,7 @@ class _Seen:
     rounding: Floats
     """By how much clipping may have moved it across [m], shape (N, K)."""
     missed: Floats
-    """Solid angle that may be left where clipping has found nothing [sr], shape (N,)."""
+    """Solid angle that may be left where no vertex is above a horizon by more than rounding [sr], shape (N,)."""
 
     def clipped(self, normals: Floats, doubtful: bool) -> _Seen:
         """The part above the horizon of `normals` (N, 3), after Sutherland and Hodgman [1974]."""
@@ -68,11 +68,11 @@ class _Seen:
         rounding = 4 * float(np.finfo(reach.dtype).eps) * reach
         doubt = rounding * np.minimum(along / np.abs(fall), 1e6) if doubtful else np.zeros_like(reach)
 
-        # A corner that sticks out by less than rounding is within so much of the horizon.
+        # What sticks out by less than rounding, if anything does, is within so much of the horizon.
         nearest = np.maximum(np.sqrt(dot(self.offsets, self.offsets).min(axis=1)), np.finfo(np.float64).tiny)
         highest, turn = heights.max(axis=1), np.minimum(rounding.max(axis=1) / nearest, np.pi)
         strip = turn * (np.minimum(along.sum(axis=1) / nearest, 2 * np.pi) + turn)
-        empty = (highest <= 0) & (highest > -rounding.max(axis=1))
+        grazes = np.abs(highest) < rounding.max(axis=1)
 
         # Each vertex is followed by the crossing of its edge; those that exist come first, the last one is repeated.
         exists = np.stack([inside, crossing], axis=2).reshape(n, 2 * count)
@@ -91,7 +91,7 @@ class _Seen:
             choose(self.relative, begin + step_vector),
             choose(self.doubt, doubt),
             choose(self.rounding, rounding),
-            self.missed + np.where(empty, strip, 0),
+            self.missed + np.where(grazes, strip, 0),
         )
 
 
