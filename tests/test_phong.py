@@ -163,6 +163,16 @@ def test_viewer_below_the_horizon_sees_nothing():
     assert (phong.reflected_radiance(light, receivers, [0.0, 0.6, 0.8], 2, np.ones(3)).value == 0).all()
 
 
+def test_a_viewer_along_the_surface_may_see_the_light_or_not():
+    light, receivers = Area(SQUARE, np.ones(1)), Receivers([0.3, -0.2, 1.0], [0.6, 0.48, -0.64])
+    along, above = np.array([-0.8, 0.36, -0.48]), np.array([0.6, 0.48, -0.64])
+    for slope in (1e-13, 1e-17, -1e-17):
+        found = phong.reflected_radiance(light, receivers, along + slope * above, 2, np.ones(1))
+        at_most = float((found.value + found.error)[0])
+        assert at_most == pytest.approx(4.88e-4, rel=1e-2)
+        assert bool(found.error[0] > 1e-4) == (abs(slope) < 1e-15)
+
+
 def test_receivers_and_axes_broadcast():
     receivers, axes = anywhere(6, seed=6)
     grid = Receivers(receivers.points[:, None], receivers.normals[:, None])

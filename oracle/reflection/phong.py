@@ -122,9 +122,13 @@ def reflected_radiance(
         # The mirrored direction is off by some ulp, by which the lobe turns.
         below = double_axis_moment(emitter.shape, oriented, axes, exponent - 1)
         error = error + 4 * _EPSILON * exponent * (below.value + below.error)
-    error = error + 4 * _EPSILON * moment.value
-    seen = np.where(cosine > 0, (exponent + 2) / (2 * np.pi), 0.0)
-    return Bounded((moment.value * seen)[..., None] * factor, (error * seen)[..., None] * factor)
+    # Along the surface rounding decides from which side one looks.
+    grazing = np.abs(cosine) <= 8 * _EPSILON
+    error = error + np.where(grazing, 1.0, 4 * _EPSILON) * moment.value
+    scale = (exponent + 2) / (2 * np.pi)
+    value = np.where(cosine > 0, scale * moment.value, 0.0)
+    error = np.where((cosine > 0) | grazing, scale * error, 0.0)
+    return Bounded(value[..., None] * factor, error[..., None] * factor)
 
 
 def directional_albedo(cosine: ArrayLike, exponent: int) -> Bounded:

@@ -98,11 +98,17 @@ def _fan_around_foot(offsets: list[Floats], height: Floats, normal: Floats) -> B
     They are poor for points far to the side, but have no diagonals next to which digits get lost.
     """
     lengths = [np.sqrt(plain_dot(offset, offset)) for offset in offsets]
+    # Corners are not quite in one plane, by as much as rounding moved them.
+    normals = np.broadcast_to(normal, offsets[0].shape)
+    heights = [plain_dot(offset, normals) for offset in offsets]
+    side = np.sign(np.sum(heights, axis=0))
+    astray = [np.abs(h - side * height) + 2 * _EPSILON * r for h, r in zip(heights, lengths, strict=True)]
     total, error = np.zeros_like(height), np.zeros_like(height)
     for i, b in enumerate(offsets):
         c, rb, rc = offsets[i - 1], lengths[i], lengths[i - 1]
         edge = c - b
-        area = plain_dot(np.cross(b, edge), np.broadcast_to(normal, b.shape))
+        cross = np.cross(b, edge)
+        area = plain_dot(cross, normals)
         rest = rb * rc + plain_dot(b, c) + height * (rb + rc)
         angle = 2 * np.arctan2(area, rest)
         total += angle
@@ -110,6 +116,10 @@ def _fan_around_foot(offsets: list[Floats], height: Floats, normal: Floats) -> B
         error += _error_of_angle(
             angle, rest, area, 4 * (rb * rc + height * (rb + rc)), 4 * rb * reach / np.minimum(rb, rc)
         )
+        # An edge so much higher or lower sweeps at most half a turn, as far as it is away.
+        distance = np.sqrt(plain_dot(cross, cross)) / np.sqrt(plain_dot(edge, edge))
+        moved = np.maximum(astray[i], astray[i - 1])
+        error += np.pi * moved / np.maximum(distance, moved)
     return Bounded(total, error)
 
 
