@@ -64,7 +64,9 @@ def contour(configuration):
     offset = minus(balls(center), balls(point))
     height = abs(dot(unit(balls(front)), offset))
     u, v = axes(balls(front))
-    aside = dot(offset, u) ** 2 + dot(offset, v) ** 2
+    # A ball around 0 has products, but no powers.
+    along_u, along_v = dot(offset, u), dot(offset, v)
+    aside = along_u * along_u + along_v * along_v
     aside = aside.sqrt() if aside > 0 else arb(0)
     r = ball(radius)
     squared, swing = height**2 + aside**2 + r**2, 2 * r * aside
