@@ -28,7 +28,7 @@ from graders.rubric import CaseOfRubric, Rubric
 from graders.submission import ImagesSubmission, Submission
 from oracle.arrays import Floats
 from oracle.expectation import Expectation
-from oracle.statistics import MIN_IMAGES, Evidence, Verdict, judge
+from oracle.statistics import MIN_IMAGES, Bank, Evidence, Judge, Verdict
 from reference_scenes.closed_form import closed_form
 from reference_scenes.export import export
 from reference_scenes.families import FAMILIES
@@ -106,9 +106,20 @@ def render_seed(family: str, seed: int, index: int) -> int:
 
 
 def judge_images(case: Case, images: Sequence[Floats], output: str) -> Evidence:
-    """Judge images of a case that are already linear and came in the format `output`."""
-    expectation = _as_seen_through(output, expectation_of(case.family, case.seed))
-    return judge(expectation, np.stack(images), case.tolerance, case.error_budget, case.detectable_bias)
+    """Judge images of a case, at least one, that are already linear and came in the format `output`."""
+    court = judge_of(case, output)
+    return [court.look(image, case.spp) for image in images][-1]
+
+
+def judge_of(case: Case, output: str) -> Judge:
+    """A judge who has seen no image of a case yet, which will come in the format `output`."""
+    bank = _bank_of(case.family, case.seed, output, case.tolerance, case.detectable_bias)
+    return Judge(bank, case.error_budget)
+
+
+@lru_cache(maxsize=32)
+def _bank_of(family: str, seed: int, output: str, tolerance: float, detectable_bias: float) -> Bank:
+    return Bank.of(_as_seen_through(output, expectation_of(family, seed)), tolerance, detectable_bias)
 
 
 def _as_seen_through(output: str, expectation: Expectation) -> Expectation:
@@ -136,11 +147,13 @@ def grade_case(case: Case, built: Built, max_images: int, timeout: float) -> Jud
             source = _Images(case, built, Path(name).resolve(), timeout)
             try:
                 wanted = MIN_IMAGES
+                court = judge_of(case, built.submission.render.output)
                 while True:
                     before = time.monotonic()
-                    images += source.more(wanted - len(images))
+                    new = source.more(wanted - len(images))
                     rendering += time.monotonic() - before
-                    evidence = judge_images(case, images, built.submission.render.output)
+                    images += new
+                    evidence = [court.look(image, case.spp) for image in new][-1]
                     if evidence.verdict != Verdict.UNDECIDED or source.exhausted(images, evidence, max_images):
                         break
                     wanted = _next_count(len(images), evidence.images_needed, max_images)

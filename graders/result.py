@@ -39,9 +39,11 @@ class EvidenceResult(Model):
     log10_threshold: float
     images: int
     distinct_images: int
+    spp: int
     ratios: dict[str, IntervalResult]
-    detectable_brighter: float | None
-    detectable_darker: float | None
+    bias: float
+    alternatives: int
+    not_excluded: tuple[str, ...]
     place: PlaceResult | None
     images_needed: int | None
     assumptions: tuple[str, ...]
@@ -55,14 +57,16 @@ class EvidenceResult(Model):
             log10_threshold=_rounded(evidence.log10_threshold),
             images=evidence.images,
             distinct_images=evidence.distinct_images,
+            spp=evidence.spp,
             ratios={
                 name: IntervalResult(
                     estimate=_rounded(ratio.estimate), low=_rounded(ratio.low), high=_rounded(ratio.high)
                 )
                 for name, ratio in evidence.ratios.items()
             },
-            detectable_brighter=_rounded_or_none(evidence.detectable_brighter),
-            detectable_darker=_rounded_or_none(evidence.detectable_darker),
+            bias=evidence.bias,
+            alternatives=evidence.alternatives,
+            not_excluded=evidence.not_excluded,
             place=None
             if place is None
             else PlaceResult(

@@ -49,7 +49,7 @@ class Rubric(Model):
     tolerance : float
         Relative bias that still counts as right.
     detectable_bias : float
-        "Right" is said only if a global bias of this size would have been found with 99 % probability.
+        "Right" is said only if being off by this much is ruled out, globally and in patterns, at 99 % each.
     max_images : int
         A case that is still undecided after this many images stays undecided.
     timeout : float

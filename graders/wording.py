@@ -14,13 +14,17 @@ def reason(evidence: Evidence) -> str:
         case Verdict.WRONG if evidence.place is not None:
             return _wrong(evidence, evidence.place)
         case Verdict.RIGHT:
-            bias = max(evidence.detectable_brighter or 0.0, evidence.detectable_darker or 0.0)
-            return f"a global bias of {_percent(bias)} or more would have been found with 99 % probability"
+            return (
+                f"being off by {_percent(evidence.bias)} is ruled out with 99 % confidence in each of"
+                f" {evidence.alternatives} ways"
+            )
         case _ if evidence.distinct_images == 1 < evidence.images:
             return "all images are the same although their seeds differ, and one is too noisy for a verdict"
         case _:
+            if evidence.alternatives == 0:
+                return "the expected image is too dark or not known well enough for a verdict"
             if evidence.images_needed is None:
-                return "the noise is too strong or too alike between pixels for a verdict; more images would not help"
+                return "the noise is too strong or too alike between pixels for a verdict; more images may not help"
             return f"the noise is too strong for a verdict; about {evidence.images_needed} images would decide"
 
 

@@ -33,6 +33,9 @@ class Expectation:
         Which pixels may be judged, shape (height, width).
     provenance : Provenance
         How it was computed.
+    largest : ndarray or None
+        The contract: the largest contribution that one sample of a customary estimator can make to each pixel, same
+        shape and unit as `radiance`; infinite where there is none, and None if there is none anywhere.
     """
 
     radiance: Floats
@@ -40,6 +43,7 @@ class Expectation:
     error_bound: Floats
     valid: Booleans
     provenance: Provenance
+    largest: Floats | None = None
 
     def __post_init__(self) -> None:
         shape = self.radiance.shape

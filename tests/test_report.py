@@ -57,8 +57,10 @@ def an_evidence(**changed):
         "images": 4,
         "distinct_images": 4,
         "ratios": {name: IntervalResult(estimate=1.0003, low=0.9971, high=1.0035) for name in ("all", "red")},
-        "detectable_brighter": 0.009,
-        "detectable_darker": 0.008,
+        "spp": 64,
+        "bias": 0.009,
+        "alternatives": 42,
+        "not_excluded": (),
         "place": None,
         "images_needed": None,
         "assumptions": ("different images are independent",),
@@ -121,8 +123,8 @@ def result(tmp_path):
     return a_result(
         judged(tmp_path, "right-case", Verdict.RIGHT, expected, expected),
         a_case("broken-case", Verdict.INFRASTRUCTURE_ERROR),
-        judged(tmp_path, "noisy-case", Verdict.UNDECIDED, expected, expected, detectable_brighter=None,
-               detectable_darker=None, images_needed=37),
+        judged(tmp_path, "noisy-case", Verdict.UNDECIDED, expected, expected, not_excluded=("darker", "turned"),
+               images_needed=37),
         a_case("failed-case", Verdict.UNGRADABLE, log="segmentation fault"),
         judged(tmp_path, "wrong-case", Verdict.WRONG, expected, 3.1416 * expected, log10_e_value=412.3, ratios=ratios,
                place=PLACE),
@@ -446,16 +448,21 @@ def test_an_ungradable_case_shows_what_was_expected(tmp_path):
     assert [a["alt"] for a in page.all("img")] == ["Expected image of case, 3 × 2 pixels"]
 
 
-def test_no_detectable_bias_is_said_and_not_invented(result, tmp_path):
-    section = Page(write_html(result, tmp_path)).cases["case-3"]
-    assert "No global bias, however large, would have been found" in " ".join(section.split())
+def test_what_is_not_ruled_out_is_named(result, tmp_path):
+    words = " ".join(Page(write_html(result, tmp_path)).cases["case-3"].split())
+    assert "Of 42 ways to be off by 0.9 %, 40 are ruled out; not yet: darker, turned;" in words
 
 
-def test_a_bias_detectable_in_one_direction_only_is_said_alone(tmp_path):
+def test_a_right_case_says_what_it_is_not(result, tmp_path):
+    words = " ".join(Page(write_html(result, tmp_path)).text.split())
+    assert "That the image is off by 0.9 % is ruled out in all of 42 ways" in words
+
+
+def test_a_case_in_which_nothing_can_be_ruled_out_says_so(tmp_path):
     image = np.full((2, 2, 3), 0.5)
-    case = judged(tmp_path, "case", Verdict.UNDECIDED, image, image, detectable_darker=None)
+    case = judged(tmp_path, "case", Verdict.UNDECIDED, image, image, alternatives=0)
     words = " ".join(Page(write_html(a_result(case), tmp_path)).cases["case-1"].split())
-    assert "A whole image that is 0.9 % or more too bright would have been found" in words
+    assert "No way of being off could be ruled out" in words
 
 
 @pytest.mark.parametrize("expected", [np.zeros((1, 1, 3)), np.full((1, 1, 3), 0.2), np.zeros((5, 3, 3))])

@@ -28,6 +28,8 @@ _MEANINGS = {
     Verdict.RIGHT: "No deviation was found, and one that matters would have been.",
 }
 _CHANNELS = ("red", "green", "blue")
+# Of the ways in which an image may still be wrong, so many are named.
+_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class _CaseView:
     anchor: str
     case: CaseResult
     overall: IntervalResult | None
-    detectable: float | None
+    excluded: float | None
     figures: tuple[_Figure, ...]
     sentences: tuple[str, ...]
     command: str
@@ -110,14 +112,12 @@ def write_html(result: Result, folder: Path) -> str:
 
 def _case_view(anchor: str, case: CaseResult, scene_format: str, folder: Path) -> _CaseView:
     evidence = case.evidence
-    detectable = None
-    if evidence and evidence.detectable_brighter is not None and evidence.detectable_darker is not None:
-        detectable = max(evidence.detectable_brighter, evidence.detectable_darker)
+    excluded = evidence.bias if evidence and evidence.alternatives and not evidence.not_excluded else None
     return _CaseView(
         anchor=anchor,
         case=case,
         overall=evidence.ratios.get("all") if evidence else None,
-        detectable=detectable,
+        excluded=excluded,
         figures=_figures(case, folder),
         sentences=_sentences(evidence, case.verdict, case.tolerance) if evidence else (),
         command=f"oracle scenes export {shlex.quote(case.family)} --seed {case.seed}"
@@ -150,7 +150,7 @@ def _sentences(evidence: EvidenceResult, verdict: Verdict, tolerance: float) -> 
             f" 99\N{NO-BREAK SPACE}% interval {_interval(overall)}."
         )
     tolerated = f"a bias of up to {text.percent(tolerance)} is tolerated."
-    sentences.append(tolerated.capitalize() if verdict == Verdict.WRONG else f"{_power(evidence)}; {tolerated}")
+    sentences.append(tolerated.capitalize() if verdict == Verdict.WRONG else f"{_ruled_out(evidence)}; {tolerated}")
     sentences.append(
         f"The evidence against the renderer, an e-value, is {text.power_of_ten(evidence.log10_e_value)}."
         f" From {text.power_of_ten(evidence.log10_threshold)} on the verdict is wrong; a right renderer ever gets"
@@ -159,20 +159,19 @@ def _sentences(evidence: EvidenceResult, verdict: Verdict, tolerance: float) -> 
     return tuple(sentences)
 
 
-def _power(evidence: EvidenceResult) -> str:
-    """What would not have gone unnoticed."""
-    found = [
-        (text.percent(bias), adjective)
-        for bias, adjective in ((evidence.detectable_brighter, "bright"), (evidence.detectable_darker, "dark"))
-        if bias is not None
-    ]
-    if not found:
-        return "No global bias, however large, would have been found with 99\N{NO-BREAK SPACE}% probability"
-    if len({bias for bias, _ in found}) == 1:
-        biases = f"{found[0][0]} or more too {' or too '.join(adjective for _, adjective in found)}"
-    else:
-        biases = ", or ".join(f"{bias} or more too {adjective}" for bias, adjective in found)
-    return f"A whole image that is {biases} would have been found with 99\N{NO-BREAK SPACE}% probability"
+def _ruled_out(evidence: EvidenceResult) -> str:
+    """What the image is not."""
+    if not evidence.alternatives:
+        return "No way of being off could be ruled out"
+    out = evidence.alternatives - len(evidence.not_excluded)
+    size = text.percent(evidence.bias)
+    if not evidence.not_excluded:
+        return (
+            f"That the image is off by {size} is ruled out in all of {out} ways, such as globally, in a channel or in"
+            " patterns, each with 99\N{NO-BREAK SPACE}% confidence"
+        )
+    named = ", ".join(evidence.not_excluded[:_NAMED]) + (" ..." if len(evidence.not_excluded) > _NAMED else "")
+    return f"Of {evidence.alternatives} ways to be off by {size}, {out} are ruled out; not yet: {named}"
 
 
 # ------------------------------------------------------------------------------------------------ pictures

@@ -57,11 +57,18 @@ class Evidence:
         From here on the verdict is wrong: minus the logarithm of the error budget.
     images, distinct_images : int
         How many images there were, and how many of them differed.
+    spp : int
+        Samples per pixel of the distinct images together.
     ratios : dict
-        Observed over expected light of the whole image, for "all" channels together and for each by name.
-    detectable_brighter, detectable_darker : float or None
-        The smallest global bias in either direction that these images would have revealed with 99 % probability;
-        None if no bias would, and for a wrong verdict.
+        Observed over expected light of the whole image, for "all" channels together and for each by name. The
+        intervals hold at all times together, unless pixels are correlated.
+    bias : float
+        The bias by which the alternatives differ from the expectation.
+    alternatives : int
+        In how many ways a renderer could be off by that: global, in a channel, patterns, quarters, shifts.
+    not_excluded : tuple of str
+        Those that the images do not yet rule out. Each that is true would be ruled out with a probability of at most
+        1 %, whenever one looks. Right means that none is left.
     place : Place or None
         Where the evidence is strongest; None unless wrong.
     images_needed : int or None
@@ -75,9 +82,11 @@ class Evidence:
     log10_threshold: float
     images: int
     distinct_images: int
+    spp: int
     ratios: dict[str, Interval]
-    detectable_brighter: float | None
-    detectable_darker: float | None
+    bias: float
+    alternatives: int
+    not_excluded: tuple[str, ...]
     place: Place | None
     images_needed: int | None
     assumptions: tuple[str, ...]

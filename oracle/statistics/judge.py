@@ -1,50 +1,35 @@
-"""The judge: bets against a renderer that a right one almost never lets win.
+"""The judge: bets against a renderer that a right one almost never lets win, and against its being wrong.
 
-A *component* is a suspicion such as "this tile is 4 % too bright". It starts with a wealth of 1 and stakes a fraction
-of it on every pixel of every image, at odds that are fair for a renderer within the tolerance. Its wealth is then a
-non-negative supermartingale, and so is the weighted mean over all components; by Ville's inequality (1939) that mean,
-the e-value, ever exceeds 1/alpha with a probability of at most alpha, whatever the distribution of the noise.
+By Ville's inequality (1939) the e-value of a right renderer, see `oracle.statistics.process`, ever exceeds 1/alpha
+with a probability of at most alpha, whatever the distribution of the noise and however often one looks.
 
 References: Waudby-Smith and Ramdas 2024 (betting), Ramdas, Gruenwald, Vovk and Shafer 2023 (e-processes).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from scipy import ndimage, special, stats
+from scipy import special
 
 from oracle.arrays import Booleans, Floats
 from oracle.expectation import Expectation
+from oracle.statistics.alternatives import alternatives
+from oracle.statistics.coarse import Grid, coarse_deviations, coarse_expectation, coarse_image, grids
+from oracle.statistics.directions import Deviation, Direction, direction, suspicions
 from oracle.statistics.evidence import Evidence, Interval, Place, Verdict
 from oracle.statistics.independence import independent
-from oracle.statistics.power import BRIGHTER, DARKER, MAX_STAKE, darker_limit, power
-from oracle.statistics.regions import Scale, scales, single_pixels
+from oracle.statistics.interval import anytime_intervals, intervals_between_images
+from oracle.statistics.null import SIDE, Null, from_blocks, null_of, planes, to_blocks
+from oracle.statistics.process import ENOUGH, Process
 
 # Fewer images cannot show that their pixels are independent.
 MIN_IMAGES = 4
-
-_BLACK_STAKES = np.array([0.05, 0.5])
-# Without independent pixels one bet per image and box is left, with these stakes.
-_BOX_STAKES = np.array([0.1, 0.3, 0.6, 0.9])
-
-# How the initial wealth is shared: between the whole image, tiles of all sizes and pixels; then between lit pixels that
-# are too bright, lit pixels that are too dark and pixels that should be black; then evenly.
-_SCALE_SHARES = {"image": 0.5, "tiles": 0.45, "pixels": 0.05}
-_SUSPICION_SHARES = {"brighter": 0.45, "darker": 0.45, "not black": 0.1}
-
-# Less light than this fraction of the image's mean counts as none.
-_BLACK_LEVEL = 1e-3
-# A bet on "too dark" must know how bright a pixel can get: this many times the brightest seen before.
-_HEADROOM = 2.0
-# Neighbours that differ by this factor have an edge between them.
-_EDGE = 1.5
-# Such a bet is lost, rather than worth less than nothing, should a pixel exceed even that.
-_LOST = 1e-6
-# Standard errors by which a Monte Carlo expectation widens the interval of right values (union over 1e6 pixels).
-_EXPECTATION_ERRORS = 7.0
-_CONFIDENCE = 0.99
+# The part of the wealth that bets on pixels and is lost when these turn out to be correlated; the rest is for blocks.
+_ON_PIXELS = 0.8
 # Where the evidence is: a place is as good as another if the logarithm of its wealth is this part of the other's.
 _NEARLY = 0.75
 # Two images that differ by less than this fraction of their mean radiance are one.
@@ -52,40 +37,260 @@ _SAME_IMAGE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class _Null:
-    """What a right renderer's pixels may average to, for "all" channels together and each, (P, height, width)."""
+class Bank:
+    """What is bet on in a case; set up once, for any number of judges."""
 
-    channels: tuple[str, ...]
-    mean: Floats
-    low: Floats
-    high: Floats
-    lit: Booleans
-    black: Booleans
+    expectation: Expectation
+    tolerance: float
+    bias: float
+    null: Null
+    suspicions: tuple[Direction, ...]
+    alternatives: tuple[Direction, ...]
+
+    @classmethod
+    def of(cls, expectation: Expectation, tolerance: float, detectable_bias: float) -> Bank:
+        """Set up the bets on an expectation, see `judge` for the arguments."""
+        null = null_of(expectation, tolerance)
+        suspected, alternative = _deviations(expectation, null, detectable_bias)
+        lit = _lit(null, expectation)
+        return cls(
+            expectation=expectation,
+            tolerance=tolerance,
+            bias=detectable_bias,
+            null=null,
+            suspicions=tuple(direction(*one, lit[one[1]]) for one in suspected),
+            alternatives=tuple(direction(*one, lit[one[1]]) for one in alternative),
+        )
 
 
-@dataclass(frozen=True, eq=False)
-class _Forecast:
-    """What the images before image k say of it, relative to the mean: arrays (K, P, height, width).
+@lru_cache(maxsize=256)
+def _on_grid(bank: Bank, grid: Grid) -> tuple[Null, tuple[Direction, ...], tuple[Direction, ...]]:
+    """What a process that bets on the blocks of a grid is made of."""
+    coarse = coarse_expectation(bank.expectation, grid)
+    null = null_of(coarse, bank.tolerance)
+    mean, lit, coarse_lit = planes(bank.expectation.radiance), _lit(bank.null, bank.expectation), _lit(null, coarse)
+    suspected, alternative = (
+        tuple(
+            direction(name, p, coarse_deviations(mean[p], lit[p], off, grid), coarse_lit[p]) for name, p, off in found
+        )
+        for found in _deviations(bank.expectation, bank.null, bank.bias)
+    )
+    return null, suspected, alternative
 
-    The pixels of an image from which its own forecast was made are not `open` to bets.
+
+def _deviations(expectation: Expectation, null: Null, bias: float) -> tuple[Iterator[Deviation], Iterator[Deviation]]:
+    """What is suspected, and what is to be ruled out."""
+    mean, lit = planes(expectation.radiance), _lit(null, expectation)
+    height, width = expectation.valid.shape
+    error = from_blocks(np.repeat(null.error[:, None], SIDE * SIDE, axis=1), null.grid)[..., :height, :width]
+    return suspicions(mean[0], lit[0]), alternatives(null.channels, mean, error, lit, bias)
+
+
+def _lit(null: Null, expectation: Expectation) -> Booleans:
+    height, width = expectation.valid.shape
+    result: Booleans = from_blocks(null.lit, null.grid)[..., :height, :width]
+    return result
+
+
+class Judge:
+    """Looks at the images of one renderer for one case as they arrive.
+
+    Parameters
+    ----------
+    bank : Bank
+        The case.
+    error_budget : float
+        Largest probability with which a right renderer may be called wrong, however often and late one looks.
     """
 
-    variance: Floats
-    headroom: Floats
-    open: Booleans
+    def __init__(self, bank: Bank, error_budget: float) -> None:
+        self._bank = bank
+        self._threshold = -float(np.log(error_budget))
+        self._pixels: Process | None = Process(bank.null, bank.suspicions, bank.alternatives)
+        self._grids: tuple[tuple[Grid, Process], ...] = ()
+        self._seen: list[Floats] = []
+        self._spp: list[int] = []
+        self._images = 0
+
+    def look(self, image: Floats, spp: int = 1) -> Evidence:
+        """Take one more image into account.
+
+        Parameters
+        ----------
+        image : ndarray
+            Independent of those before, shape (height, width, channels); finite and at least 0.
+        spp : int
+            Samples per pixel.
+
+        Returns
+        -------
+        Evidence
+            From all images so far.
+
+        Raises
+        ------
+        ValueError
+            If the image does not fit the expectation, or holds negative or non-finite pixels.
+        """
+        expected = self._bank.expectation.radiance.shape
+        if image.shape != expected:
+            raise ValueError(f"an image has shape {image.shape}, it must be {expected}")
+        if not np.isfinite(image).all() or (image < 0).any():
+            raise ValueError("images must be finite and at least 0 everywhere")
+        self._images += 1
+        if not any(_alike(image, other) for other in self._seen):
+            self._seen.append(image)
+            self._spp.append(spp)
+            self._bet(image, spp)
+        return self._evidence()
+
+    def _bet(self, image: Floats, spp: int) -> None:
+        if self._pixels is None:
+            self._bet_on_grids(image, spp)
+            return
+        self._pixels.see(to_blocks(planes(image)), spp)
+        if len(self._seen) >= MIN_IMAGES and not independent(self._comparable()):
+            self._pixels = None
+            self._grids = tuple((grid, Process(*_on_grid(self._bank, grid))) for grid in grids(self._comparable()))
+            for past, samples in zip(self._seen, self._spp, strict=True):
+                self._bet_on_grids(past, samples)
+
+    def _bet_on_grids(self, image: Floats, spp: int) -> None:
+        for grid, process in self._grids:
+            process.see(to_blocks(coarse_image(planes(image), self._bank.expectation.valid, grid)), spp)
+
+    def _comparable(self) -> Floats:
+        """Pairs of consecutive images of equally many samples, all channels together."""
+        kept: list[Floats] = []
+        index = 0
+        while index + 1 < len(self._seen):
+            if self._spp[index] == self._spp[index + 1]:
+                kept += [image.mean(axis=-1) for image in self._seen[index : index + 2]]
+                index += 2
+            else:
+                index += 1
+        lit = _lit(self._bank.null, self._bank.expectation)[0]
+        return lit * np.stack(kept) if kept else np.zeros((2, *lit.shape))
+
+    # ------------------------------------------------------------------------------------------- what is found
+
+    def _evidence(self) -> Evidence:
+        bank = self._bank
+        processes: list[Process] = [self._pixels] if self._pixels else [process for _, process in self._grids]
+        share = _ON_PIXELS if self._pixels else (1 - _ON_PIXELS) / len(processes)
+        log_e = float(special.logsumexp([process.log_e for process in processes])) + float(np.log(share))
+        excluded = special.logsumexp([p.log_excluded for p in processes], axis=0) - np.log(len(processes))
+        left = excluded < ENOUGH
+        not_excluded = tuple(one.name for one, open_ in zip(bank.alternatives, left, strict=True) if open_)
+        if log_e >= self._threshold:
+            verdict = Verdict.WRONG
+        elif bank.alternatives and not not_excluded:
+            verdict = Verdict.RIGHT
+        else:
+            verdict = Verdict.UNDECIDED
+        return Evidence(
+            verdict=verdict,
+            log10_e_value=log_e / float(np.log(10)),
+            log10_threshold=self._threshold / float(np.log(10)),
+            images=self._images,
+            distinct_images=len(self._seen),
+            spp=sum(self._spp),
+            ratios=self._ratios(),
+            bias=bank.bias,
+            alternatives=len(bank.alternatives),
+            not_excluded=not_excluded,
+            place=self._place() if verdict == Verdict.WRONG else None,
+            images_needed=self._needed(log_e, excluded) if verdict == Verdict.UNDECIDED else None,
+            assumptions=self._assumptions(),
+        )
+
+    def _ratios(self) -> dict[str, Interval]:
+        if self._pixels:
+            return anytime_intervals(self._bank.null, self._pixels.past)
+        images = np.stack([to_blocks(planes(image)) for image in self._seen])
+        return intervals_between_images(self._bank.null, images, np.array(self._spp, dtype=np.float64))
+
+    def _needed(self, log_e: float, excluded: Floats) -> int | None:
+        """Images after which one of both processes gets through, if they go on as they did."""
+        count = len(self._seen)
+        candidates = []
+        if log_e > 1:
+            candidates.append(count * self._threshold / log_e)
+        slowest = float(excluded.min()) if len(excluded) else 0.0
+        if slowest > 0.5:
+            candidates.append(count * ENOUGH / slowest)
+        return max(int(np.ceil(min(candidates))), count + 1) if candidates else None
+
+    def _place(self) -> Place:
+        """The smallest box in which some suspicion has grown nearly as rich as any has."""
+        height, width = self._bank.expectation.valid.shape
+        if self._pixels is None:
+            of_grids = [wealth for _, process in self._grids for wealth in process.boxes()]
+            richest = max(of_grids, key=lambda one: one.logs.max())
+            return self._seen_in(richest.suspicion, 0, 0, 0, width, height)
+        wealth = self._pixels.boxes()
+        most = max(float(one.logs.max()) for one in wealth)
+        by_size = sorted(wealth, key=lambda w: int(((w.scale.x1 - w.scale.x0) * (w.scale.y1 - w.scale.y0)).max()))
+        best = next((w for w in by_size if w.logs.max() >= _NEARLY * most), by_size[-1])
+        # All channels together are preferred to one in the same way.
+        logs = best.logs[:, :1] if best.logs[:, 0].max() >= _NEARLY * best.logs.max() else best.logs
+        _, plane, box = np.unravel_index(int(logs.argmax()), logs.shape)
+        scale = best.scale
+        x0, y0 = int(scale.x0[box]) * SIDE, int(scale.y0[box]) * SIDE
+        x1, y1 = min(int(scale.x1[box]) * SIDE, width), min(int(scale.y1[box]) * SIDE, height)
+        return self._seen_in(best.suspicion, int(plane), x0, y0, x1, y1)
+
+    def _seen_in(self, suspicion: str, plane: int, x0: int, y0: int, x1: int, y1: int) -> Place:
+        """A box with what is seen in it."""
+        null = self._bank.null
+        box = (plane, slice(y0, y1), slice(x0, x1))
+        mask = from_blocks(null.black if suspicion == "not black" else null.lit, null.grid)[box]
+        expected = float(planes(self._bank.expectation.radiance)[box][mask].sum())
+        mean = np.average([planes(image)[box] for image in self._seen], axis=0, weights=self._spp)
+        ratio = None if suspicion == "not black" or expected == 0 else float(mean[mask].sum()) / expected
+        return Place(x0, y0, x1 - x0, y1 - y0, null.channels[plane], suspicion, ratio)
+
+    def _assumptions(self) -> tuple[str, ...]:
+        distinct = len(self._seen)
+        statements = []
+        if distinct < self._images:
+            statements.append(f"{self._images - distinct} of {self._images} images repeat another and are not counted")
+        if self._pixels is None:
+            gap = self._grids[0][0].stride
+            apart = "one bet per image is made" if len(self._grids) == 1 else f"bets are made {gap} pixels apart"
+            statements.append(f"the noise of different pixels is correlated: {apart}")
+        elif distinct < MIN_IMAGES:
+            statements.append(
+                f"the noise of different pixels is independent (not checked: fewer than {MIN_IMAGES} images)"
+            )
+        else:
+            statements.append("the noise of different pixels is independent (checked)")
+        statements.append("different images are independent")
+        if np.isfinite(self._bank.null.largest).all():
+            statements.append(
+                "no sample is brighter than those of all customary estimators (only for bets on too dark)"
+            )
+        else:
+            statements.append(
+                "no pixel of an image is brighter than twice the brightest before it (only for bets on too dark)"
+            )
+        return tuple(statements)
 
 
-@dataclass(frozen=True, eq=False)
-class _Wealth:
-    """Logarithms of share times wealth, (components, P, boxes), of one suspicion at one scale."""
-
-    suspicion: str
-    scale: Scale
-    logs: Floats
+def _alike(image: Floats, other: Floats) -> bool:
+    """Whether an image is a copy of another, up to rounding: no second observation."""
+    close = _SAME_IMAGE * image.mean()
+    # The means are compared first, for most images differ in them.
+    return bool(abs(image.mean() - other.mean()) <= close and np.abs(image - other).mean() <= close)
 
 
 def judge(
-    expectation: Expectation, images: Floats, tolerance: float, error_budget: float, detectable_bias: float
+    expectation: Expectation,
+    images: Sequence[Floats] | Floats,
+    tolerance: float,
+    error_budget: float,
+    detectable_bias: float,
+    spp: int = 1,
 ) -> Evidence:
     """Judge the images of one case.
 
@@ -93,15 +298,17 @@ def judge(
     ----------
     expectation : Expectation
         What a right renderer shows, shape (height, width, channels).
-    images : ndarray
-        Independent images of the case, in the order in which they were rendered, shape (K, height, width, channels);
+    images : sequence of ndarray
+        Independent images of the case, in the order in which they were rendered, shape (height, width, channels) each;
         finite and at least 0.
     tolerance : float
         Relative bias that still counts as right, in every pixel.
     error_budget : float
         Largest probability with which a right renderer may be called wrong, however often and late one looks.
     detectable_bias : float
-        "Right" is said only if a global bias of this size would have been found with 99 % probability.
+        "Right" is said only if biases of this size are ruled out.
+    spp : int
+        Samples per pixel of each image.
 
     Returns
     -------
@@ -111,297 +318,9 @@ def judge(
     Raises
     ------
     ValueError
-        If the images do not fit the expectation, or hold negative or non-finite pixels.
+        If the images do not fit the expectation, or hold negative or non-finite pixels, or there are none.
     """
-    if images.ndim != 4 or images.shape[1:] != expectation.radiance.shape or len(images) == 0:
-        raise ValueError(f"images have shape {images.shape}, they must be (K, *{expectation.radiance.shape})")
-    if not np.isfinite(images).all() or (images < 0).any():
-        raise ValueError("images must be finite and at least 0 everywhere")
-
-    null = _null(expectation, tolerance)
-    observed = np.stack([_with_all(image) for image in _distinct(images)])
-    count = len(observed)
-    pixels_independent = count < MIN_IMAGES or independent(observed[:, 0] * expectation.valid)
-    bank = scales(*expectation.valid.shape)
-
-    brighter = darker = images_needed = None
-    if pixels_independent:
-        forecast = _forecast(null, observed)
-        wealth = _bet_on_pixels(null, observed, forecast, bank)
-        bet_upon = forecast.open[:, 0] & null.lit[0]
-        brighter, darker, images_needed = power(
-            ratios=_relative(null, observed)[:, 0][bet_upon],
-            variance=forecast.variance[:, 0][bet_upon],
-            headroom=forecast.headroom[:, 0][bet_upon],
-            images=count,
-            tolerance=tolerance,
-            threshold=-np.log(error_budget * _share("image", "brighter", len(BRIGHTER) * len(observed[0]))),
-            detectable_bias=detectable_bias,
-        )
-    else:
-        wealth = _bet_on_boxes(null, observed, bank)
-
-    log_e = float(special.logsumexp([special.logsumexp(w.logs) for w in wealth]))
-    log_threshold = -float(np.log(error_budget))
-    detectable = max(brighter, darker) if brighter is not None and darker is not None else None
-    if log_e >= log_threshold:
-        verdict = Verdict.WRONG
-    elif detectable is not None and detectable <= detectable_bias:
-        verdict = Verdict.RIGHT
-    else:
-        verdict = Verdict.UNDECIDED
-    return Evidence(
-        verdict=verdict,
-        log10_e_value=log_e / float(np.log(10)),
-        log10_threshold=log_threshold / float(np.log(10)),
-        images=len(images),
-        distinct_images=count,
-        ratios=_ratios(null, observed, pixels_independent),
-        # What a wrong renderer's images would have revealed had it been right, nobody knows.
-        detectable_brighter=None if verdict == Verdict.WRONG else brighter,
-        detectable_darker=None if verdict == Verdict.WRONG else darker,
-        place=_place(null, observed, wealth) if verdict == Verdict.WRONG else None,
-        images_needed=images_needed if verdict == Verdict.UNDECIDED else None,
-        assumptions=_assumptions(len(images), count, pixels_independent),
-    )
-
-
-# ----------------------------------------------------------------------------------------------- preparation
-
-
-def _distinct(images: Floats) -> Floats:
-    """The images without repetitions: a copy, up to rounding, is no second observation."""
-    kept: list[int] = []
-    scale = np.abs(images).mean()
-    for index, image in enumerate(images):
-        if all(np.abs(image - images[k]).mean() > _SAME_IMAGE * scale for k in kept):
-            kept.append(index)
-    return images[kept] if kept else images[:1]
-
-
-def _with_all(image: Floats) -> Floats:
-    """Channels first, led by their mean: (height, width, C) to (C + 1, height, width), or (1, ...) for one channel."""
-    channels = np.moveaxis(image, -1, 0)
-    return channels if len(channels) == 1 else np.concatenate([channels.mean(axis=0, keepdims=True), channels])
-
-
-def _null(expectation: Expectation, tolerance: float) -> _Null:
-    mean = _with_all(expectation.radiance)
-    slack = _with_all(expectation.error_bound + _EXPECTATION_ERRORS * expectation.standard_error)
-    level = _BLACK_LEVEL * mean.mean(axis=(1, 2), keepdims=True)
-    # An entirely black image has no mean to measure by; then any light is too much.
-    level = np.maximum(level, np.finfo(np.float32).tiny)
-    high = np.maximum(mean * (1 + tolerance) + slack, level)
-    low = mean * (1 - tolerance) - slack
-    lit = expectation.valid & (mean > level) & (low > 0.5 * mean)
-    black = expectation.valid & (mean <= level)
-    count = expectation.radiance.shape[2]
-    names = ("red", "green", "blue") if count == 3 else tuple(f"channel {i}" for i in range(count))
-    return _Null(("all",) if count == 1 else ("all", *names), mean, low, high, lit, black)
-
-
-def _relative(null: _Null, observed: Floats) -> Floats:
-    """Observed over expected light where light is expected, 1 elsewhere."""
-    result: Floats = np.where(null.lit, observed / np.where(null.lit, null.mean, 1.0), 1.0)
-    return result
-
-
-def _forecast(null: _Null, observed: Floats) -> _Forecast:
-    """Variance and brightest value to expect in each image, from the images before it.
-
-    The first image is forecast from a quarter of its own pixels.
-    """
-    relative = _relative(null, observed)
-    squares = (relative - 1) ** 2
-    quarter = np.zeros(observed.shape[2:], dtype=np.bool_)
-    quarter[::2, ::2] = True
-
-    variance, headroom = np.empty_like(relative), np.empty_like(relative)
-    is_open = np.broadcast_to(null.lit | null.black, relative.shape).copy()
-    is_open[0] &= ~quarter
-    smooth = null.lit & _is_smooth(null.mean)
-    for k in range(len(observed)):
-        known = null.lit & (quarter if k == 0 else True)
-        past = slice(0, max(k, 1))
-        variance[k] = _local_mean(squares[past].mean(axis=0), known, size=9 if k == 0 else 5)
-        headroom[k] = _HEADROOM * np.where(
-            smooth, _highest(relative[past], known & smooth), _highest(relative[past], known)
-        )
-    return _Forecast(variance, headroom, is_open)
-
-
-def _is_smooth(mean: Floats) -> Booleans:
-    """Where the expected image has no edge: there, values far above the mean are the renderer's own."""
-    window = (1, 3, 3)
-    result: Booleans = ndimage.maximum_filter(mean, window) < _EDGE * ndimage.minimum_filter(mean, window)
-    return result
-
-
-def _highest(relative: Floats, known: Booleans) -> Floats:
-    """Largest observed over expected value among known pixels of images (K, P, height, width), shape (P, 1, 1)."""
-    highest: Floats = np.where(known, relative, 1.0).max(axis=(0, 2, 3))[:, None, None]
-    return highest
-
-
-def _local_mean(squares: Floats, known: Booleans, size: int) -> Floats:
-    """Local means of squared deviations over the known pixels; their global mean where none is near."""
-    weights = known.astype(np.float64)
-    total = weights.sum(axis=(1, 2), keepdims=True)
-    overall = (squares * weights).sum(axis=(1, 2), keepdims=True) / np.maximum(total, 1)
-    window = (1, size, size)
-    near = ndimage.uniform_filter(weights, window, mode="constant")
-    local = ndimage.uniform_filter(squares * weights, window, mode="constant")
-    result: Floats = np.where(near > 1e-9, np.maximum(local, 0) / np.maximum(near, 1e-9), overall)
-    return result
-
-
-# ---------------------------------------------------------------------------------------------------- bets
-
-
-def _share(scale: str, suspicion: str, components: int) -> float:
-    return _SCALE_SHARES[scale] * _SUSPICION_SHARES[suspicion] / components
-
-
-def _bet_on_pixels(null: _Null, observed: Floats, forecast: _Forecast, bank: tuple[Scale, ...]) -> list[_Wealth]:
-    """Stake on every pixel of every image; the wealth of a box is the product over its pixels."""
-    lit, black = forecast.open & null.lit, forecast.open & null.black
-    above = observed / null.high - 1
-    below = observed / np.where(null.lit, null.low, 1.0) - 1
-    # 1 - l below stays positive up to the headroom.
-    low_ratio = np.where(null.lit, null.low / np.where(null.lit, null.mean, 1.0), 1.0)
-    most = darker_limit(forecast.headroom, low_ratio)
-
-    def brighter(amplitude: float) -> Floats:
-        stake = np.minimum(amplitude / (forecast.variance + amplitude**2), MAX_STAKE)
-        return np.log1p(np.where(lit, stake, 0.0) * above)
-
-    # A pixel above the headroom shows that such bets were unfair so far: they start again with the next image.
-    surprised = (lit & (observed > forecast.headroom * null.mean)).any(axis=(1, 2, 3))
-    fair = np.arange(len(observed)) > np.flatnonzero(np.append(True, surprised))[-1] - 1
-    dark_bets = lit & fair[:, None, None, None]
-
-    def darker(amplitude: float) -> Floats:
-        stake = np.minimum(amplitude / (forecast.variance + amplitude**2), most)
-        return np.log(np.maximum(1 - np.where(dark_bets, stake, 0.0) * below, _LOST))
-
-    def not_black(stake: float) -> Floats:
-        return np.log1p(np.where(black, stake, 0.0) * above)
-
-    wealth: list[_Wealth] = []
-    for suspicion, bet, parameters in (
-        ("brighter", brighter, BRIGHTER),
-        ("darker", darker, DARKER),
-        ("not black", not_black, _BLACK_STAKES),
-    ):
-        # Gains of all images, (components, P, height, width).
-        gains = np.stack([bet(parameter).sum(axis=0) for parameter in parameters])
-        wealth += _shared(suspicion, [(scale, scale.sums(gains)) for scale in bank])
-        pixels = gains.reshape(*gains.shape[:2], -1)
-        wealth.append(
-            _Wealth(
-                suspicion, single_pixels(*gains.shape[2:]), pixels + np.log(_share("pixels", suspicion, pixels.size))
-            )
-        )
-    return wealth
-
-
-def _bet_on_boxes(null: _Null, observed: Floats, bank: tuple[Scale, ...]) -> list[_Wealth]:
-    """Stake once per image and box, on its mean: valid however the pixels of an image depend on each other."""
-    wealth: list[_Wealth] = []
-    for suspicion, mask, limit in (
-        ("brighter", null.lit, null.high),
-        ("darker", null.lit, null.low),
-        ("not black", null.black, null.high),
-    ):
-        entries = []
-        for scale in bank:
-            expected = scale.sums(np.where(mask, limit, 0.0))
-            measured = np.maximum(scale.sums(np.where(mask, observed, 0.0)), 0.0)
-            # Differences of sums leave rounding errors where nothing is expected.
-            matters = expected > 1e-9 * expected.max()
-            deviation = np.where(matters, measured / np.where(matters, expected, 1.0) - 1, 0.0)
-            stakes = _BOX_STAKES[:, None, None, None] * np.ones_like(deviation)
-            if suspicion == "darker":
-                # How bright a box can get is known only from the images before.
-                highest = np.maximum.accumulate(np.maximum(deviation, 0.0), axis=0).max(axis=2, keepdims=True)
-                most = MAX_STAKE / np.maximum(_HEADROOM * (1 + highest) - 1, 1.0)
-                stakes[:, 1:] = np.minimum(stakes[:, 1:], most[:-1])
-                stakes[:, 0] = 0
-                gains = np.log(np.maximum(1 - stakes * deviation, _LOST))
-            else:
-                gains = np.log1p(stakes * deviation)
-            entries.append((scale, gains.sum(axis=1)))
-        wealth += _shared(suspicion, entries)
-    return wealth
-
-
-def _shared(suspicion: str, entries: list[tuple[Scale, Floats]]) -> list[_Wealth]:
-    """Give the components of the whole image and of all tile scales their shares."""
-    tile_scales = len(entries) - 1
-    wealth = []
-    for scale, gains in entries:
-        kind, scales_of_kind = ("image", 1) if scale.name == "image" else ("tiles", tile_scales)
-        share = _share(kind, suspicion, gains.size * scales_of_kind)
-        wealth.append(_Wealth(suspicion, scale, gains + np.log(share)))
-    return wealth
-
-
-# ------------------------------------------------------------------------------------------- what is reported
-
-
-def _ratios(null: _Null, observed: Floats, pixels_independent: bool) -> dict[str, Interval]:
-    """Observed over expected light of the whole image and its confidence interval, for each channel."""
-    result = {}
-    count = len(observed)
-    for p, name in enumerate(null.channels):
-        lit = null.lit[p]
-        expected = float(null.mean[p][lit].sum())
-        if expected == 0:
-            continue
-        each = observed[:, p][:, lit].sum(axis=1) / expected
-        estimate = float(each.mean())
-        quantile = float(stats.norm.ppf((1 + _CONFIDENCE) / 2))
-        if count == 1:
-            residuals = observed[0, p][lit] - estimate * null.mean[p][lit]
-            error = float(np.sqrt((residuals**2).sum())) / expected
-        elif pixels_independent:
-            error = float(np.sqrt(observed[:, p][:, lit].var(axis=0, ddof=1).sum() / count)) / expected
-        else:
-            error = float(each.std(ddof=1)) / np.sqrt(count)
-            quantile = float(stats.t.ppf((1 + _CONFIDENCE) / 2, count - 1))
-        result[name] = Interval(estimate, estimate - quantile * error, estimate + quantile * error)
-    return result
-
-
-def _place(null: _Null, observed: Floats, wealth: list[_Wealth]) -> Place:
-    """The smallest box in which some suspicion has grown nearly as rich as any has."""
-    richest = max(float(w.logs.max()) for w in wealth)
-    by_size = sorted(wealth, key=lambda w: int(((w.scale.x1 - w.scale.x0) * (w.scale.y1 - w.scale.y0)).max()))
-    best = next(w for w in by_size if w.logs.max() >= _NEARLY * richest)
-    # All channels together are preferred to one in the same way.
-    logs = best.logs[:, :1] if best.logs[:, 0].max() >= _NEARLY * best.logs.max() else best.logs
-    _, p, box = np.unravel_index(int(logs.argmax()), logs.shape)
-    scale = best.scale
-    x0, x1, y0, y1 = (int(bound[box]) for bound in (scale.x0, scale.x1, scale.y0, scale.y1))
-    mask = (null.black if best.suspicion == "not black" else null.lit)[p, y0:y1, x0:x1]
-    expected = float(null.mean[p, y0:y1, x0:x1][mask].sum())
-    measured = float(observed[:, p, y0:y1, x0:x1].mean(axis=0)[mask].sum())
-    ratio = None if best.suspicion == "not black" or expected == 0 else measured / expected
-    return Place(x0, y0, x1 - x0, y1 - y0, null.channels[p], best.suspicion, ratio)
-
-
-def _assumptions(count: int, distinct: int, pixels_independent: bool) -> tuple[str, ...]:
-    statements = []
-    if distinct < count:
-        statements.append(f"{count - distinct} of {count} images repeat another and are not counted")
-    if not pixels_independent:
-        statements.append("the noise of different pixels is correlated: only one bet per image and region is made")
-    elif distinct < MIN_IMAGES:
-        statements.append(f"the noise of different pixels is independent (not checked: fewer than {MIN_IMAGES} images)")
-    else:
-        statements.append("the noise of different pixels is independent (checked)")
-    statements.append("different images are independent")
-    statements.append(
-        f"no pixel of an image is brighter than {_HEADROOM:g} times the brightest before it (only for bets on too dark)"
-    )
-    return tuple(statements)
+    if len(images) == 0:
+        raise ValueError("there are no images to judge")
+    court = Judge(Bank.of(expectation, tolerance, detectable_bias), error_budget)
+    return [court.look(image, spp) for image in images][-1]
