@@ -144,7 +144,7 @@ def limit_of(scene: Scene, factor: Floats | float) -> float:
 
 
 def report(scene: Scene, bug: str, limit: float, found: Floats, targets: tuple[float, float] | None) -> bool:
-    """Print a line of the table; returns whether mean and 99th percentile reach their targets, relative to the limit."""
+    """Print a line of the table; returns whether mean and 99th percentile reach their targets, relative to `limit`."""
     mean, high = found.mean(), np.quantile(found, 0.99, method="inverted_cdf")
     figures = f"{limit:>6.2f} {mean:>6.2f} {mean / limit:>6.2f} {high:>6.0f} {high / limit:>6.2f}"
     print(f"{scene.name:<20} {bug:<24} {figures}", flush=True)
