@@ -175,6 +175,7 @@ FORMS = [
         incidences(),
         take(lambda c, eta: dielectric_reflectance(c, eta).unpolarised),
         exactly(lambda c, eta: sum(by_angles(c, eta)) / 2),
+        share=0.001,
     ),
     Form(
         "Fresnel, dielectric, transmitted",
@@ -208,6 +209,7 @@ FORMS = [
         incidences(),
         take(lambda c, eta: slab_reflectance(c, eta).unpolarised),
         slab_mean(0),
+        share=0.001,
     ),
     Form(
         "slab, transmitted",
