@@ -230,7 +230,7 @@ def test_good_and_bad_scenes_are_told_apart(tmp_path, images):
 def test_right_images_are_right(images):
     result = oracle("judge", *images, "--scene", "sphere", "--seed", "5")
     assert (result.returncode, result.stderr) == (0, "")
-    assert result.stdout.startswith("right: a global bias of ")
+    assert result.stdout.startswith("right: being off by 2 % is ruled out with 99 % confidence in each of ")
 
 
 def test_images_of_another_seed_are_wrong(images):
