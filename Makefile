@@ -53,8 +53,8 @@ lock: ## resolve requirements.lock anew
 	"$$folder/bin/uv" pip compile --quiet --upgrade --universal --python-version 3.11 --group dev --generate-hashes \
 	    --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file requirements.lock pyproject.toml
 
-calibrate: setup ## false alarms and power of the judge, by simulation; minutes
-	@PYTHONPATH=tests .venv/bin/python tests/calibration.py 1000
+calibrate: setup ## false alarms of the judge in both directions, by simulation; a quarter of an hour
+	@PYTHONPATH=tests .venv/bin/python tests/calibration.py 200
 
 COUNT ?= 20000
 verify: setup ## every closed form against ball arithmetic in 20,000 configurations; four hours (COUNT=500: minutes)
