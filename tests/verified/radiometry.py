@@ -155,5 +155,5 @@ FORMS = [
     Form("flux of a quadrilateral", flat_shapes(4), polygon_flux, polygon_flux_exact),
     Form("flux of a mesh", flat_shapes(4), mesh_flux, mesh_flux_exact),
     Form("flux of a rectangle", rectangles(), rectangle_flux, rectangle_flux_exact),
-    Form("intensity of a polygon", st.tuples(flat_shapes(4), directions()), seen, seen_exact),
+    Form("intensity of a polygon", st.tuples(flat_shapes(4), directions()), seen, seen_exact, share=0.001),
 ]
