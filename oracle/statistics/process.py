@@ -32,7 +32,7 @@ _PARTS_OF_TILES = (0.003, 0.03, 0.3, 0.9)
 _RICHEST = 1e250
 # With less than this, as a logarithm, a component never comes back in any reasonable time.
 _RUINED = -60.0
-# An alternative is excluded if the bet against it has ever won this much, as a logarithm: false with 1 %.
+# An alternative is excluded if the bet against it ever has this much, as a logarithm: false with 1 %.
 ENOUGH = float(np.log(100))
 # Of the first image, two pixels of each block are only looked at.
 _LOOKED_AT = (5, 15)
@@ -153,8 +153,8 @@ class Process:
 
     @property
     def log_excluded(self) -> Floats:
-        """Logarithms of the largest wealth that the bets against each alternative have had."""
-        return self._against.highest
+        """Logarithms of the wealth of the bets against each alternative, which end once they have enough."""
+        return self._against.logs
 
     @property
     def _start(self) -> float:
@@ -227,7 +227,6 @@ class _Series:
     def __init__(self, count: int) -> None:
         self._gains = np.zeros(count)
         self._first = np.zeros(count)
-        self.highest = np.full(count, -np.inf)
 
     @property
     def alive(self) -> Integers:
@@ -236,8 +235,8 @@ class _Series:
 
     @property
     def undecided(self) -> Integers:
-        """Those of them that never had enough to exclude what they bet against."""
-        return np.flatnonzero((self.logs > _RUINED) & (self.highest < ENOUGH))
+        """Those of them that have not enough to exclude what they bet against; the others stop there."""
+        return np.flatnonzero((self.logs > _RUINED) & (self.logs < ENOUGH))
 
     def add(self, index: int, gain: float) -> None:
         """Bet once."""
@@ -247,7 +246,6 @@ class _Series:
         """Let the rest of the wealth begin after the first image."""
         if is_first:
             self._first = self._gains.copy()
-        self.highest = np.maximum(self.highest, self.logs)
 
     def forget(self) -> None:
         """Begin anew."""
@@ -258,7 +256,6 @@ class _Series:
         """Give up what was gained."""
         self._gains = np.minimum(self._gains, 0)
         self._first = np.minimum(self._first, self._gains)
-        self.highest[:] = -np.inf
 
     @property
     def logs(self) -> Floats:
